@@ -1,0 +1,64 @@
+//! `bondwise check`: the preflight.
+
+use std::process::ExitCode;
+
+use bondwise::Result;
+use bondwise::case::build::{Options, available_memory, load};
+
+use crate::{CaseArgs, on_threads, say};
+
+pub fn check(args: &CaseArgs) -> Result<ExitCode> {
+    on_threads(args.threads, || -> Result<ExitCode> {
+        let simulation = load(&args.case, &args.overrides, &Options::default())?;
+        let facts = simulation.model.facts();
+        let families = simulation.model.family_sizes();
+        say!("{}", simulation.title);
+        say!("points            {}", facts.points);
+        say!("bonds (directed)  {}, of which pre-cracks cut {}", facts.bonds, facts.cut_bonds);
+        say!("spacing           {:.6e} m", facts.spacing);
+        say!("horizon           {:.6e} m, ratio {:.4}", facts.horizon, facts.horizon / facts.spacing);
+        say!("micromodulus      {:.6e}", facts.micromodulus);
+        match facts.critical_stretch {
+            Some(s) => say!("critical stretch  {s:.6e}"),
+            None => say!("critical stretch  none: bonds never break"),
+        }
+        say!("bar wave speed    {:.1} m/s", facts.bar_speed);
+        if let Some(speed) = facts.rayleigh_speed {
+            say!("Rayleigh speed    {speed:.1} m/s");
+        }
+        say!("stable step       {:.6e} s", facts.stable_step);
+        let end = simulation.n_steps as f64 * simulation.clock.dt;
+        say!("steps             {} of {:.6e} s, to t = {end:.6e} s", simulation.n_steps, simulation.clock.dt);
+        let mib = |bytes: u64| bytes as f64 / 1048576.0;
+        say!("memory            {:.1} MiB for fields and bonds", mib(facts.memory));
+        if let Some(free) = available_memory() {
+            say!("free memory       {:.1} MiB", mib(free));
+        }
+        say!("neighbours of a point (bonds that hold at the start):");
+        histogram(&families);
+        Ok(ExitCode::SUCCESS)
+    })?
+}
+
+/// At most twelve bars of equal width.
+fn histogram(sizes: &[u32]) {
+    let (Some(&least), Some(&most)) = (sizes.iter().min(), sizes.iter().max()) else { return };
+    let mean = sizes.iter().map(|&n| f64::from(n)).sum::<f64>() / sizes.len() as f64;
+    let width = (most - least) / 12 + 1;
+    let mut bars = vec![0usize; ((most - least) / width + 1) as usize];
+    for n in sizes {
+        bars[((n - least) / width) as usize] += 1;
+    }
+    let tallest = bars.iter().copied().max().unwrap_or(1);
+    for (k, &count) in bars.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let low = least + k as u32 * width;
+        let high = (low + width - 1).min(most);
+        let label = if low == high { format!("{low}") } else { format!("{low}-{high}") };
+        say!("{label:>9} {count:>10} {}", "#".repeat((50 * count).div_ceil(tallest)));
+    }
+    say!("fewest {least}, mean {mean:.1}, most {most}");
+    let lonely = sizes.iter().filter(|&&n| n == 0).count();
+    if lonely > 0 {
+        say!("warning: {lonely} points have no bond at all; they fly free");
+    }
+}

@@ -1,0 +1,105 @@
+//! `bondwise run`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use bondwise::case::build::{Options, load};
+use bondwise::output::report::Report;
+use bondwise::simulation::{Wish, prepare_folder};
+use bondwise::Result;
+
+use crate::progress::Line;
+use crate::{RunArgs, on_threads, say};
+
+pub fn run(args: &RunArgs) -> Result<ExitCode> {
+    let folder = args.out.clone().unwrap_or_else(|| free_folder(&args.case.case));
+    let report = on_threads(args.case.threads, || -> Result<Report> {
+        let options = Options { folder: folder.clone(), many_files: args.many_files, ..Options::default() };
+        let mut simulation = load(&args.case.case, &args.case.overrides, &options)?;
+        prepare_folder(&folder, args.overwrite)?;
+        if !args.quiet {
+            let facts = simulation.model.facts();
+            say!("{}", simulation.title);
+            say!(
+                "{} points, {} bonds, horizon {:.4e} m, {} steps of {:.4e} s, {} threads, results in {}",
+                facts.points,
+                facts.bonds - facts.cut_bonds,
+                facts.horizon,
+                simulation.n_steps,
+                simulation.clock.dt,
+                simulation.threads,
+                folder.display()
+            );
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        let asked = stop.clone();
+        // The second Ctrl-C ends the program at once.
+        let _ = ctrlc::set_handler(move || {
+            if asked.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+            eprintln!("\ninterrupted: finishing this step and writing the last frame (again to end at once)");
+        });
+        let mut line = Line::new(args.quiet);
+        let report = simulation.run(|progress| {
+            line.show(progress);
+            if stop.load(Ordering::Relaxed) { Wish::Stop } else { Wish::Continue }
+        });
+        line.finish();
+        report
+    })??;
+    if !args.quiet {
+        summary(&report, &folder);
+    }
+    Ok(if report.status == "interrupted" { ExitCode::from(130) } else { ExitCode::SUCCESS })
+}
+
+/// `out/<case>`, or `out/<case>-2` and so on when that is taken: nothing is overwritten.
+fn free_folder(case: &Path) -> PathBuf {
+    let absolute = std::path::absolute(case).unwrap_or_else(|_| case.to_path_buf());
+    let named = if absolute.is_dir() || absolute.file_stem().is_none_or(|s| s != "case") {
+        absolute.file_stem()
+    } else {
+        absolute.parent().and_then(Path::file_name)
+    };
+    let name = named.map_or("case".into(), |n| n.to_string_lossy().into_owned());
+    let numbered = (2..).map(|k| format!("{name}-{k}"));
+    let mut folders = std::iter::once(name.clone()).chain(numbered).map(|name| Path::new("out").join(name));
+    folders.find(|folder| !folder.exists()).unwrap_or_default()
+}
+
+fn summary(report: &Report, folder: &Path) {
+    let e = &report.energy;
+    say!("{} after {} steps, t = {:.6e} s", report.status, report.steps, report.end_time);
+    say!(
+        "energy: kinetic {:.6e}, strain {:.6e}, fracture {:.6e}, external work {:.6e} J; largest imbalance {:.2e}",
+        e.kinetic,
+        e.strain,
+        e.fracture,
+        e.external,
+        report.energy_imbalance
+    );
+    say!("broken bonds: {}; damaged points: {}", report.broken_bonds, report.damaged_points);
+    if let Some(tip) = &report.crack_tip {
+        let place = tip.position.as_ref().map_or("none".into(), |x| {
+            x.iter().map(|x| format!("{:.3}", 1e3 * x)).collect::<Vec<_>>().join(", ")
+        });
+        say!(
+            "crack tip: ({place}) mm; largest speed {:.0} m/s (Rayleigh speed {:.0} m/s)",
+            tip.largest_speed,
+            tip.rayleigh_speed.unwrap_or(f64::NAN)
+        );
+    }
+    let w = &report.wall_seconds;
+    say!(
+        "time: setup {:.2} s, stepping {:.2} s, output {:.2} s; {:.3e} bond updates per second",
+        w.setup,
+        w.stepping,
+        w.output,
+        report.bond_updates_per_second
+    );
+    say!("state hash: {}", report.state_hash);
+    say!("report: {}", folder.join("report.json").display());
+}

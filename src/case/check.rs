@@ -1,0 +1,362 @@
+//! Rules across keys: what one key alone cannot tell. Each mistake is located at the key that has to change.
+
+use std::collections::BTreeSet;
+
+use super::diagnostics::Diagnostic;
+use super::model::{
+    BondBased, Case, CriticalStretch, Crack, FailurePair, Law, Load, Motion, Output, Plane, Region, Shape, Solver,
+};
+use super::read::{Located, Source};
+use crate::expression::nearest;
+
+/// Everything that is wrong with a case whose keys are all right by themselves, and what is odd.
+pub fn check(case: &Located<Case>) -> Vec<Diagnostic> {
+    let mut checker = Checker { source: &case.source, list: Vec::new() };
+    checker.case(&case.value);
+    checker.list
+}
+
+struct Checker<'a> {
+    source: &'a Source,
+    list: Vec<Diagnostic>,
+}
+
+impl Checker<'_> {
+    fn error(&mut self, path: &str, message: impl Into<String>, help: &str) {
+        let diagnostic = self.source.error(path, message);
+        self.list.push(if help.is_empty() { diagnostic } else { diagnostic.help(help) });
+    }
+
+    fn warning(&mut self, path: &str, message: impl Into<String>) {
+        self.list.push(self.source.warning(path, message));
+    }
+
+    /// Exactly one of two keys of a table.
+    fn either(&mut self, path: &str, a: (&str, bool), b: (&str, bool)) {
+        match (a.1, b.1) {
+            (true, true) => {
+                self.error(path, format!("`{}` and `{}` are both given; only one may be", a.0, b.0), "remove one of them");
+            }
+            (false, false) => {
+                self.error(path, format!("neither `{}` nor `{}` is given; one must be", a.0, b.0), "");
+            }
+            _ => {}
+        }
+    }
+
+    fn case(&mut self, case: &Case) {
+        let dimension = case.case.dimension;
+        self.geometry(case);
+        for (name, region) in &case.sets {
+            let path = format!("sets.{name}");
+            if name == "all" {
+                self.error(&path, "the name `all` is taken: it stands for every point", "choose another name");
+            }
+            self.region(region, dimension, &path);
+        }
+        self.discretization(case);
+        let elasticity = &case.physics.elasticity;
+        let (law, parameters) = match &elasticity.law {
+            Law::BondBased(p) => ("bond_based", p),
+            Law::BondBasedLinear(p) => ("bond_based_linear", p),
+        };
+        self.law(parameters, dimension, &format!("physics.elasticity.law.{law}"));
+        let imported = case.geometry.points.is_some();
+        let mut used = BTreeSet::new();
+        if let Some(super::model::Failure::CriticalStretch(failure)) = &elasticity.failure {
+            self.failure(failure, case, imported, &mut used);
+        }
+        for (k, condition) in case.conditions.iter().enumerate() {
+            let path = format!("conditions[{k}]");
+            self.set_name(&condition.on, case, imported, &format!("{path}.on"), &mut used);
+            let given = [condition.initial.is_some(), condition.prescribe.is_some(), condition.load.is_some()];
+            if given.iter().filter(|g| **g).count() != 1 {
+                let message = "a condition has exactly one of `initial`, `prescribe`, `load`";
+                self.error(&path, message, "give each its own [[conditions]] table");
+            }
+            if condition.initial.is_some() && condition.until.is_some() {
+                let message = "an initial value has no end: `until` belongs to `prescribe` and `load`";
+                self.error(&format!("{path}.until"), message, "remove it");
+            }
+            for (key, motion) in [("initial", &condition.initial), ("prescribe", &condition.prescribe)] {
+                if let Some(motion) = motion {
+                    let (field, component) = match motion {
+                        Motion::Displacement { component, .. } => ("displacement", *component),
+                        Motion::Velocity { component, .. } => ("velocity", *component),
+                    };
+                    self.component(component, dimension, &format!("{path}.{key}.{field}.component"));
+                }
+            }
+            match &condition.load {
+                Some(Load::BodyForce { component, .. }) => {
+                    self.component(*component, dimension, &format!("{path}.load.body_force.component"));
+                }
+                Some(Load::Traction { component, .. }) => {
+                    self.component(*component, dimension, &format!("{path}.load.traction.component"));
+                }
+                Some(Load::Pressure { .. }) if case.geometry.shape.is_none() => {
+                    let message = "a pressure needs the normals of `geometry.shape`, and this body comes from a file";
+                    self.error(&format!("{path}.load.pressure"), message, "use a traction by component");
+                }
+                _ => {}
+            }
+        }
+        for name in case.sets.keys() {
+            if !used.contains(name.as_str()) {
+                self.warning(&format!("sets.{name}"), "this set is defined but never used");
+            }
+        }
+        let Solver::VelocityVerlet(solver) = &case.solver;
+        if solver.safety.is_some() && solver.time_step.is_some() {
+            let path = "solver.velocity_verlet.time_step";
+            self.error(path, "`safety` and `time_step` are both given; only one may be", "remove one of them");
+        }
+        self.outputs(case);
+    }
+
+    fn geometry(&mut self, case: &Case) {
+        let (geometry, dimension) = (&case.geometry, case.case.dimension);
+        self.either("geometry", ("shape", geometry.shape.is_some()), ("points", geometry.points.is_some()));
+        if let Some(shape) = &geometry.shape {
+            if geometry.spacing.is_none() {
+                self.error("geometry", "`spacing` is missing: a shape is filled with cells of this side", "add `spacing = <number, m>`");
+            }
+            self.shape(shape, dimension, "geometry.shape");
+        } else {
+            if geometry.spacing.is_some() {
+                self.error("geometry.spacing", "`spacing` belongs to `shape`; points from a file have volumes instead", "remove it");
+            }
+            if geometry.perturb.is_some() {
+                self.error("geometry.perturb", "only the lattice of a `shape` can be perturbed", "remove it");
+            }
+        }
+        for (k, crack) in geometry.cracks.iter().enumerate() {
+            let (name, wanted, vertices) = match crack {
+                Crack::Point(_) => ("point", 1, None),
+                Crack::Segment { .. } => ("segment", 2, None),
+                Crack::Polyline { vertices } => ("polyline", 2, Some(vertices)),
+                Crack::Polygon { vertices } => ("polygon", 3, Some(vertices)),
+                Crack::Disc { .. } => ("disc", 3, None),
+            };
+            let path = format!("geometry.cracks[{k}].{name}");
+            self.fits(name, wanted, dimension, &path);
+            for (i, vertex) in vertices.into_iter().flatten().enumerate() {
+                self.vector(vertex, wanted, &format!("{path}.vertices[{i}]"));
+            }
+        }
+    }
+
+    fn fits(&mut self, name: &str, wanted: usize, dimension: usize, path: &str) {
+        if wanted != dimension {
+            let help = match dimension {
+                1 => "in 1D: segment, box; crack point",
+                2 => "in 2D: rectangle, box, disk, ring, polygon; cracks segment, polyline",
+                _ => "in 3D: block, box, sphere, cylinder, tube, extrusion; cracks polygon, disc",
+            };
+            self.error(path, format!("`{name}` is for {wanted}D, and this case is {dimension}D"), help);
+        }
+    }
+
+    fn vector(&mut self, vector: &[f64], dimension: usize, path: &str) {
+        if vector.len() != dimension {
+            let message = format!("{} components, where {dimension} are wanted in {dimension}D", vector.len());
+            self.error(path, message, "");
+        }
+    }
+
+    fn component(&mut self, component: usize, dimension: usize, path: &str) {
+        if component >= dimension {
+            self.error(path, format!("component {component} does not exist in {dimension}D; 0 to {} do", dimension - 1), "");
+        }
+    }
+
+    fn shape(&mut self, shape: &Shape, dimension: usize, path: &str) {
+        match shape {
+            Shape::Segment { .. } => self.fits("segment", 1, dimension, path),
+            Shape::Rectangle { .. } => self.fits("rectangle", 2, dimension, path),
+            Shape::Disk { .. } => self.fits("disk", 2, dimension, path),
+            Shape::Ring { .. } => self.fits("ring", 2, dimension, path),
+            Shape::Polygon { vertices } => {
+                self.fits("polygon", 2, dimension, path);
+                for (i, vertex) in vertices.iter().enumerate() {
+                    self.vector(vertex, 2, &format!("{path}.polygon.vertices[{i}]"));
+                }
+            }
+            Shape::Block { .. } => self.fits("block", 3, dimension, path),
+            Shape::Sphere { .. } => self.fits("sphere", 3, dimension, path),
+            Shape::Cylinder { .. } => self.fits("cylinder", 3, dimension, path),
+            Shape::Tube { .. } => self.fits("tube", 3, dimension, path),
+            Shape::Extrusion { vertices, .. } => {
+                self.fits("extrusion", 3, dimension, path);
+                for (i, vertex) in vertices.iter().enumerate() {
+                    self.vector(vertex, 2, &format!("{path}.extrusion.vertices[{i}]"));
+                }
+            }
+            Shape::Box { low, high } => {
+                self.vector(low, dimension, &format!("{path}.box.low"));
+                self.vector(high, dimension, &format!("{path}.box.high"));
+            }
+            Shape::Union(members) | Shape::Intersection(members) => {
+                let name = if matches!(shape, Shape::Union(_)) { "union" } else { "intersection" };
+                for (i, member) in members.iter().enumerate() {
+                    self.shape(member, dimension, &format!("{path}.{name}[{i}]"));
+                }
+            }
+            Shape::Difference { of, minus } => {
+                self.shape(of, dimension, &format!("{path}.difference.of"));
+                for (i, member) in minus.iter().enumerate() {
+                    self.shape(member, dimension, &format!("{path}.difference.minus[{i}]"));
+                }
+            }
+        }
+    }
+
+    fn region(&mut self, region: &Region, dimension: usize, path: &str) {
+        match region {
+            Region::Box { low, high } => {
+                self.vector(low, dimension, &format!("{path}.box.low"));
+                self.vector(high, dimension, &format!("{path}.box.high"));
+                for (d, (a, b)) in low.iter().zip(high).enumerate() {
+                    if a > b {
+                        self.error(&format!("{path}.box"), format!("low[{d}] = {a} is above high[{d}] = {b}"), "");
+                    }
+                }
+            }
+            Region::Inside(shape) => self.shape(shape, dimension, &format!("{path}.inside")),
+            Region::Where(_) | Region::Layer { .. } => {}
+            Region::All(regions) | Region::Any(regions) => {
+                for region in regions {
+                    self.region(region, dimension, path);
+                }
+            }
+            Region::Not(region) => self.region(region, dimension, path),
+        }
+    }
+
+    fn discretization(&mut self, case: &Case) {
+        let d = &case.discretization;
+        self.either("discretization", ("horizon_ratio", d.horizon_ratio.is_some()), ("horizon", d.horizon.is_some()));
+        if let (Some(horizon), Some(spacing)) = (d.horizon, case.geometry.spacing)
+            && horizon < spacing
+        {
+            let message = format!(
+                "the horizon {horizon} m is smaller than the spacing {spacing} m (ratio {:.3}): points see nobody",
+                horizon / spacing
+            );
+            self.error("discretization.horizon", message, "a ratio of 3 to 5 is usual");
+        }
+    }
+
+    fn law(&mut self, law: &BondBased, dimension: usize, path: &str) {
+        if law.plane.is_some() && dimension != 2 {
+            self.error(&format!("{path}.plane"), format!("`plane` is for 2D, and this case is {dimension}D"), "remove it");
+        }
+        if let Some(poisson) = law.poisson {
+            let (fixed, name, why) = match (dimension, law.plane) {
+                (1, _) => (None, "", "in 1D there is no Poisson ratio"),
+                (2, Some(Plane::Strain)) => (Some(1.0 / 4.0), "1/4", "in plane strain"),
+                (2, _) => (Some(1.0 / 3.0), "1/3", "in plane stress"),
+                _ => (Some(1.0 / 4.0), "1/4", "in 3D"),
+            };
+            // 1e-3 lets 0.333 stand for 1/3.
+            if fixed.is_none_or(|fixed| (poisson - fixed).abs() > 1e-3) {
+                let message = match fixed {
+                    Some(_) => format!("found {poisson}, but the bond-based law fixes the Poisson ratio at {name} {why}"),
+                    None => format!("found {poisson}, but {why}"),
+                };
+                self.error(&format!("{path}.poisson"), message, "remove the key, or give that value");
+            }
+        }
+    }
+
+    fn failure<'a>(&mut self, failure: &'a CriticalStretch, case: &'a Case, imported: bool, used: &mut BTreeSet<&'a str>) {
+        let path = "physics.elasticity.failure.critical_stretch";
+        self.either(
+            path,
+            ("fracture_energy", failure.fracture_energy.is_some()),
+            ("stretch", failure.stretch.is_some()),
+        );
+        for (k, name) in failure.no_fail.iter().enumerate() {
+            self.set_name(name, case, imported, &format!("{path}.no_fail[{k}]"), used);
+        }
+        for (k, FailurePair { between, fracture_energy, stretch }) in failure.pairs.iter().enumerate() {
+            let path = format!("{path}.pairs[{k}]");
+            self.either(&path, ("fracture_energy", fracture_energy.is_some()), ("stretch", stretch.is_some()));
+            for (i, name) in between.iter().enumerate() {
+                self.set_name(name, case, imported, &format!("{path}.between[{i}]"), used);
+            }
+        }
+    }
+
+    /// Sets of imported points are known only when the file is read: `build` asks for them.
+    fn set_name<'a>(&mut self, name: &'a str, case: &'a Case, imported: bool, path: &str, used: &mut BTreeSet<&'a str>) {
+        used.insert(name);
+        if name == "all" || case.sets.contains_key(name) || imported {
+            return;
+        }
+        let names: Vec<&str> = case.sets.keys().map(String::as_str).chain(["all"]).collect();
+        let help = nearest(name, names.iter().copied()).map_or(String::new(), |n| format!("did you mean `{n}`?"));
+        self.error(path, format!("found \"{name}\"; no set has this name; sets: {}", names.join(", ")), &help);
+    }
+
+    fn outputs(&mut self, case: &Case) {
+        let mut probes: Vec<(String, usize)> = Vec::new();
+        let (mut histories, mut tips) = (0, 0);
+        for (k, output) in case.output.iter().enumerate() {
+            let path = format!("output[{k}]");
+            match output {
+                Output::Vtu(vtu) => self.either(
+                    &format!("{path}.vtu"),
+                    ("every", vtu.every.is_some()),
+                    ("every_steps", vtu.every_steps.is_some()),
+                ),
+                Output::Picture(picture) => {
+                    let path = format!("{path}.picture");
+                    let given = [picture.every.is_some(), picture.every_steps.is_some(), !picture.at.is_empty()];
+                    if given.iter().filter(|g| **g).count() > 1 {
+                        self.error(&path, "at most one of `every`, `every_steps`, `at` may be given", "");
+                    }
+                    if let Some(range) = &picture.range
+                        && range[0] >= range[1]
+                    {
+                        self.error(&format!("{path}.range"), "the first end must be below the second", "");
+                    }
+                    if let Some(component) = picture.component {
+                        self.component(component, case.case.dimension, &format!("{path}.component"));
+                    }
+                }
+                Output::History(_) => {
+                    histories += 1;
+                    if histories > 1 {
+                        self.error(&path, "a second history; one table is written", "remove it");
+                    }
+                }
+                Output::Probe(probe) => {
+                    self.vector(&probe.at, case.case.dimension, &format!("{path}.probe.at"));
+                    let plain = !probe.name.is_empty()
+                        && probe.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+                    if !plain {
+                        let message = "a probe's name becomes a file name: letters, digits, `_` and `-` only";
+                        self.error(&format!("{path}.probe.name"), message, "");
+                    }
+                    let folded = probe.name.to_lowercase();
+                    if let Some((_, first)) = probes.iter().find(|(name, _)| *name == folded) {
+                        let message = format!("output[{first}] has this name already (capitals do not count)");
+                        self.error(&format!("{path}.probe.name"), message, "");
+                    }
+                    probes.push((folded, k));
+                }
+                Output::CrackTip(tip) => {
+                    tips += 1;
+                    if tips > 1 {
+                        self.error(&path, "a second crack tip; one is followed", "remove it");
+                    }
+                    self.vector(&tip.along, case.case.dimension, &format!("{path}.crack_tip.along"));
+                    if tip.along.iter().all(|&a| a == 0.0) {
+                        self.error(&format!("{path}.crack_tip.along"), "the zero vector is no direction", "");
+                    }
+                }
+            }
+        }
+    }
+}

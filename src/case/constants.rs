@@ -1,0 +1,339 @@
+//! The named constants of a case, and the texts that stand for a number.
+//!
+//! ```toml
+//! [constants]
+//! h = "0.5 mm"
+//! delta = "3*h"
+//! ```
+//!
+//! A constant may use constants written below it; a circle is a mistake. Constants carry no
+//! dimension: they are SI numbers, and so is every expression of them.
+
+use std::collections::{HashMap, HashSet};
+
+use super::diagnostics::{Diagnostic, shorten};
+use super::read::Source;
+use super::tree::{Entry, Node, NodeValue, Origin, join};
+use super::units::{Dimension, Unit, UnitError, split_quantity};
+use crate::expression::{Expression, ExpressionError, nearest};
+
+/// More than any case needs; bounds the depth of a chain of constants.
+const MOST_CONSTANTS: usize = 1000;
+
+/// Names that mean something in every expression.
+const RESERVED: [&str; 34] = [
+    "x", "y", "z", "t", "pi", "and", "or", "not", "sin", "cos", "tan", "asin", "acos", "atan",
+    "atan2", "sinh", "cosh", "tanh", "exp", "log", "log10", "sqrt", "abs", "sign", "floor", "ceil",
+    "min", "max", "pow", "hypot", "step", "if", "clamp", "erf",
+];
+
+/// The constants of a case that could be computed, and the names of those that could not.
+#[derive(Debug, Default)]
+pub(super) struct Constants {
+    pub known: Vec<(String, f64)>,
+    pub failed: HashSet<String>,
+}
+
+/// Why a text is not the number that is wanted.
+#[derive(Debug)]
+pub(super) enum Mistake {
+    /// The unit does not exist or cannot be read.
+    Unit(UnitError),
+    /// The unit measures something else.
+    Dimension {
+        found: Dimension,
+    },
+    Expression(ExpressionError),
+    /// It follows from a mistake already reported.
+    Echo,
+}
+
+impl Constants {
+    /// The SI number behind `"72 GPa"` or `"2*h"`; any dimension is accepted if none is given.
+    pub fn number(&self, text: &str, wanted: Option<Dimension>) -> Result<f64, Mistake> {
+        if let Some(number) = self.quantity(text, wanted, &[]) {
+            return number;
+        }
+        self.constant_expression(text)
+    }
+
+    /// The SI number behind a number with a unit; `None` if the text is not of that form.
+    pub fn quantity(
+        &self,
+        text: &str,
+        wanted: Option<Dimension>,
+        variables: &[&str],
+    ) -> Option<Result<f64, Mistake>> {
+        let (number, unit_text) = split_quantity(text)?;
+        // `2t` is a product with its sign forgotten, and is explained as such.
+        let word = names(unit_text).next().unwrap_or("");
+        let parsed = Unit::parse(unit_text);
+        let is_known = |(name, _): &(String, f64)| name == word;
+        if parsed.is_err() && (variables.contains(&word) || self.known.iter().any(is_known)) {
+            return None;
+        }
+        let value = parsed.map_err(Mistake::Unit).and_then(|unit| {
+            if wanted.is_some_and(|wanted| wanted != unit.dimension) {
+                return Err(Mistake::Dimension {
+                    found: unit.dimension,
+                });
+            }
+            unit.to_si(number).ok_or_else(|| {
+                Mistake::Unit(UnitError {
+                    message: "the number cannot be read".to_owned(),
+                    help: None,
+                })
+            })
+        });
+        Some(value)
+    }
+
+    /// Compiles a formula of the given variables.
+    pub fn compile(&self, text: &str, variables: &[&str]) -> Result<Expression, Mistake> {
+        Expression::compile(text, variables, &self.known).map_err(|error| {
+            if names(text).any(|name| self.failed.contains(name)) {
+                Mistake::Echo
+            } else {
+                Mistake::Expression(error)
+            }
+        })
+    }
+
+    fn constant_expression(&self, text: &str) -> Result<f64, Mistake> {
+        let expression = self.compile(text, &[])?;
+        expression.as_constant().ok_or_else(|| {
+            Mistake::Expression(ExpressionError {
+                message: "this is not a constant".to_owned(),
+                start: 0,
+                end: text.len(),
+                help: None,
+            })
+        })
+    }
+
+    /// Computes the entries of `[constants]` in the order in which they need each other.
+    pub fn evaluate(table: &Node, source: &Source) -> (Self, Vec<Diagnostic>) {
+        let mut work = Evaluation {
+            entries: table.entries(),
+            by_name: HashMap::new(),
+            state: vec![State::New; table.entries().len()],
+            constants: Self::default(),
+            source,
+            diagnostics: Vec::new(),
+        };
+        if !matches!(table.value, NodeValue::Table(_)) {
+            let message = format!("`constants` must be a table, not {}", table.kind());
+            work.report(&table.origin, "", message, |d| {
+                d.help("write `[constants]` and below it lines such as `h = \"0.5 mm\"`")
+            });
+        }
+        if work.entries.len() > MOST_CONSTANTS {
+            let message = format!("more than {MOST_CONSTANTS} named constants");
+            work.report(&table.origin, "", message, |d| d);
+            return (work.constants, work.diagnostics);
+        }
+        for (index, entry) in work.entries.iter().enumerate() {
+            work.by_name.insert(&entry.key, index);
+        }
+        for index in 0..work.entries.len() {
+            work.visit(index, &mut Vec::new());
+        }
+        (work.constants, work.diagnostics)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum State {
+    New,
+    Open,
+    Done,
+}
+
+struct Evaluation<'a> {
+    entries: &'a [Entry],
+    by_name: HashMap<&'a str, usize>,
+    state: Vec<State>,
+    constants: Constants,
+    source: &'a Source,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl<'a> Evaluation<'a> {
+    /// Computes a constant after those it needs; `chain` is how it was reached.
+    fn visit(&mut self, index: usize, chain: &mut Vec<&'a str>) {
+        let entry = &self.entries[index];
+        match self.state[index] {
+            State::Done => return,
+            State::Open => {
+                chain.push(&entry.key);
+                let first = chain.iter().position(|name| *name == entry.key);
+                let circle = chain[first.unwrap_or(0)..].join(" -> ");
+                chain.pop();
+                let message = format!("the constants need each other: {circle}");
+                self.report(&entry.node.origin, &entry.key, message, |d| d);
+                self.constants.failed.insert(entry.key.clone());
+                return;
+            }
+            State::New => {}
+        }
+        self.state[index] = State::Open;
+        chain.push(&entry.key);
+        if let NodeValue::Text(text) = &entry.node.value
+            && split_quantity(text).is_none()
+        {
+            for name in names(text) {
+                if let Some(&needed) = self.by_name.get(name) {
+                    self.visit(needed, chain);
+                }
+            }
+        }
+        chain.pop();
+        self.state[index] = State::Done;
+        match self.compute(entry) {
+            Some(value) if !self.constants.failed.contains(&entry.key) => {
+                self.constants.known.push((entry.key.clone(), value));
+            }
+            _ => {
+                self.constants.failed.insert(entry.key.clone());
+            }
+        }
+    }
+
+    fn compute(&mut self, entry: &'a Entry) -> Option<f64> {
+        let name = entry.key.as_str();
+        let is_start = |c: char| c.is_ascii_alphabetic() || c == '_';
+        let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        if !name.starts_with(is_start) || !name.chars().all(is_part) {
+            let message = "the name of a constant has letters, digits and `_` only";
+            self.report(&entry.key_origin, name, message.to_owned(), |d| d);
+            return None;
+        }
+        if RESERVED.contains(&name) {
+            let message = format!("`{name}` means something else in every expression");
+            self.report(&entry.key_origin, name, message, |d| {
+                d.help("choose another name")
+            });
+            return None;
+        }
+        let value = match &entry.node.value {
+            NodeValue::Integer(Some(value)) => Some(*value as f64),
+            NodeValue::Float(value) => Some(*value),
+            NodeValue::Text(text) => match self.constants.number(text, None) {
+                Ok(value) => Some(value),
+                Err(mistake) => {
+                    let path = join("constants", name);
+                    let found = self.source.found(&entry.node);
+                    self.diagnostics.extend(mistake.diagnostic(
+                        self.source,
+                        &entry.node,
+                        &path,
+                        found,
+                        None,
+                    ));
+                    return None;
+                }
+            },
+            _ => None,
+        };
+        let found = self.source.found(&entry.node);
+        match value {
+            Some(value) if value.is_finite() => return Some(value),
+            Some(_) => {
+                let message = "must be finite".to_owned();
+                self.report(&entry.node.origin, name, message, |d| d.found(found));
+            }
+            None => {
+                let message = "must be a number, a number with a unit or an expression";
+                self.report(&entry.node.origin, name, message.to_owned(), |d| {
+                    d.found(found)
+                });
+            }
+        }
+        None
+    }
+
+    fn report(
+        &mut self,
+        origin: &Origin,
+        name: &str,
+        message: String,
+        more: impl FnOnce(Diagnostic) -> Diagnostic,
+    ) {
+        let path = if name.is_empty() {
+            "constants".to_owned()
+        } else {
+            join("constants", name)
+        };
+        let place = self.source.place_of(origin);
+        let diagnostic = Diagnostic::error(place, &path, message);
+        self.diagnostics.push(more(diagnostic));
+    }
+}
+
+impl Mistake {
+    /// The remark about the text of `node`; nothing for an echo.
+    pub fn diagnostic(
+        self,
+        source: &Source,
+        node: &Node,
+        path: &str,
+        found: String,
+        wanted: Option<(Dimension, &str)>,
+    ) -> Option<Diagnostic> {
+        let place = source.place_of(&node.origin);
+        let allowed = wanted.map(|(_, allowed)| allowed.to_owned());
+        let mut diagnostic = match self {
+            Self::Echo => return None,
+            Self::Unit(error) => Diagnostic {
+                help: error.help,
+                allowed,
+                ..Diagnostic::error(place, path, error.message)
+            },
+            Self::Dimension { found } => {
+                let wanted = wanted.map_or_else(String::new, |(wanted, _)| {
+                    format!(" where {} is wanted", wanted.name())
+                });
+                let message = format!("this is {}{wanted}", found.name());
+                Diagnostic {
+                    allowed,
+                    ..Diagnostic::error(place, path, message)
+                }
+            }
+            Self::Expression(error) => {
+                let NodeValue::Text(text) = &node.value else {
+                    return None;
+                };
+                let column = 1 + text.get(..error.start).map_or(0, |s| s.chars().count());
+                Diagnostic {
+                    help: error.help,
+                    ..Diagnostic::error(
+                        source.place_inside(node, error.start),
+                        path,
+                        format!("{} (character {column} of the text)", error.message),
+                    )
+                }
+            }
+        };
+        diagnostic.found = Some(shorten(&found));
+        Some(diagnostic)
+    }
+}
+
+/// The names in an expression; `e5` of `1e5` is not one.
+fn names(text: &str) -> impl Iterator<Item = &str> {
+    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
+    text.split(move |c| !is_part(c))
+        .filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_'))
+}
+
+/// The nearest of some names to a misspelt one, if it is near.
+pub(super) fn did_you_mean<'a>(
+    name: &str,
+    names: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
+    // The cost grows with the square of the length; no key is this long.
+    if name.len() > 64 {
+        return None;
+    }
+    nearest(name, names)
+}

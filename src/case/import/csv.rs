@@ -1,0 +1,129 @@
+//! Point clouds from CSV tables: columns `x`, `y`, `z` (as many as the dimension), `volume`, optionally `sets`.
+//!
+//! Columns are found by name, in any order; others are refused. Values are in SI units. The names in `sets` are
+//! joined by `+`. Lines that start with `#` are comments.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::field::Vector;
+
+/// Largest table that is read.
+const LARGEST: u64 = 8 << 30;
+
+/// The points of a table: positions (m), volumes (m³, m² or m), and the point indices of each named set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Points<const D: usize> {
+    pub positions: Vec<Vector<D>>,
+    pub volumes: Vec<f64>,
+    pub sets: BTreeMap<String, Vec<u32>>,
+}
+
+/// Reads a table; every refusal names file, line, column and cell.
+pub fn read<const D: usize>(path: &Path) -> Result<Points<D>> {
+    let refuse = |line: u64, message: String| Error::Refused(format!("{}:{line}: error: {message}", path.display()));
+    let metadata = std::fs::metadata(path).map_err(|e| Error::Refused(format!("{}: {e}", path.display())))?;
+    if !metadata.is_file() || metadata.len() > LARGEST {
+        return Err(Error::Refused(format!("{}: is not a regular file of at most {LARGEST} bytes", path.display())));
+    }
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .map_err(|e| Error::Refused(format!("{}: {e}", path.display())))?;
+    let headers = reader.headers().map_err(|e| refuse(1, e.to_string()))?.clone();
+    let names = &["x", "y", "z"][..D];
+    let known: Vec<&str> = names.iter().copied().chain(["volume", "sets"]).collect();
+    for header in &headers {
+        if !known.contains(&header) {
+            let separator = if header.contains(';') { "; columns are separated by commas" } else { "" };
+            return Err(refuse(1, format!("column `{header}`; known columns: {}{separator}", known.join(", "))));
+        }
+    }
+    let column = |name: &str| {
+        let found: Vec<usize> = (0..headers.len()).filter(|&k| &headers[k] == name).collect();
+        match found[..] {
+            [k] => Ok(k),
+            [] => Err(refuse(1, format!("column `{name}` is missing; found: {}", headers.iter().collect::<Vec<_>>().join(", ")))),
+            _ => Err(refuse(1, format!("column `{name}` stands {} times", found.len()))),
+        }
+    };
+    let mut axes = [0; D];
+    for d in 0..D {
+        axes[d] = column(names[d])?;
+    }
+    let volume = column("volume")?;
+    let set_column = headers.iter().position(|h| h == "sets");
+    let mut points = Points { positions: Vec::new(), volumes: Vec::new(), sets: BTreeMap::new() };
+    for record in reader.records() {
+        let record = record.map_err(|e| {
+            let line = e.position().map_or(0, csv::Position::line);
+            refuse(line, e.to_string())
+        })?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |k: usize| {
+            let cell = &record[k];
+            match cell.parse::<f64>() {
+                Ok(x) if x.is_finite() => Ok(x),
+                _ => Err(refuse(line, format!("column `{}`: found `{cell}`, where a finite number is wanted", &headers[k]))),
+            }
+        };
+        let mut position = [0.0; D];
+        for d in 0..D {
+            position[d] = number(axes[d])?;
+        }
+        let v = number(volume)?;
+        if v <= 0.0 {
+            return Err(refuse(line, format!("column `volume`: found {v}, where a volume above 0 is wanted")));
+        }
+        let index = points.positions.len() as u32;
+        if let Some(k) = set_column {
+            for name in record[k].split('+').map(str::trim).filter(|n| !n.is_empty()) {
+                points.sets.entry(name.to_string()).or_default().push(index);
+            }
+        }
+        points.positions.push(position);
+        points.volumes.push(v);
+    }
+    if points.positions.is_empty() {
+        return Err(refuse(1, "the table holds no points".into()));
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str) -> Result<Points<2>> {
+        let path = std::env::temp_dir().join(format!("bondwise_csv_{}_{}.csv", std::process::id(), text.len()));
+        std::fs::write(&path, text).unwrap();
+        let points = read::<2>(&path);
+        std::fs::remove_file(&path).unwrap();
+        points
+    }
+
+    #[test]
+    fn columns_are_found_by_name_and_sets_are_split() {
+        let points = read_text("volume,y,x,sets\n1,2,3,a+b\n# note\n4,5,6,b\n").unwrap();
+        assert_eq!(points.positions, [[3.0, 2.0], [6.0, 5.0]]);
+        assert_eq!(points.volumes, [1.0, 4.0]);
+        assert_eq!((&points.sets["a"], &points.sets["b"]), (&vec![0], &vec![0, 1]));
+    }
+
+    #[test]
+    fn mistakes_name_line_and_column() {
+        for (text, expected) in [
+            ("x,y,volume\n1,2,3\n1,oops,3\n", ":3: error: column `y`: found `oops`"),
+            ("x,y,volume\n1,2,-3\n", "column `volume`: found -3"),
+            ("x,y\n1,2\n", "column `volume` is missing"),
+            ("x;y;volume\n1;2;3\n", "columns are separated by commas"),
+            ("x,y,volume\n1,2\n", ":2: error"),
+            ("x,y,volume\n", "no points"),
+        ] {
+            let message = read_text(text).unwrap_err().to_string();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}

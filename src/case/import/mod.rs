@@ -1,0 +1,3 @@
+//! Point clouds from files.
+
+pub mod csv;

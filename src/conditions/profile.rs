@@ -1,0 +1,48 @@
+//! A user's formula at the points of a set.
+
+use std::sync::Arc;
+
+use crate::expression::Expression;
+use crate::field::embed;
+use crate::geometry::Cloud;
+
+/// The names that a formula may use, in the order in which they are given: reference position (m) and time (s).
+pub const VARIABLES: [&str; 4] = ["x", "y", "z", "t"];
+
+/// A formula in x, y, z, t, evaluated at the points of a set; again only when the time matters.
+#[derive(Debug, Clone)]
+pub struct Profile {
+    expression: Expression,
+    columns: [Vec<f64>; 3],
+    values: Vec<f64>,
+    moves: bool,
+    ready: bool,
+}
+
+impl Profile {
+    pub fn new<const D: usize>(expression: Expression, cloud: &Cloud<D>, slots: &Arc<[u32]>) -> Self {
+        let columns = std::array::from_fn(|axis| {
+            if !expression.uses(VARIABLES[axis]) {
+                return vec![0.0];
+            }
+            slots.iter().map(|&slot| embed(&cloud.position(slot as usize))[axis]).collect()
+        });
+        let moves = expression.uses("t");
+        Profile { expression, columns, values: vec![0.0; slots.len()], moves, ready: false }
+    }
+
+    /// The values at time `t`, in the order of the set.
+    pub fn at(&mut self, t: f64) -> &[f64] {
+        if self.moves || !self.ready {
+            let [x, y, z] = &self.columns;
+            self.expression.evaluate_batch(&[x, y, z, &[t]], &mut self.values);
+            self.ready = true;
+        }
+        &self.values
+    }
+
+    /// The formula as the user wrote it.
+    pub fn source(&self) -> &str {
+        self.expression.source()
+    }
+}

@@ -1,0 +1,10 @@
+//! Who interacts with whom: families, the state of each bond, and the vocabulary of one bond.
+
+pub mod bond;
+pub mod families;
+pub mod search;
+pub mod states;
+
+pub use bond::{Bond, BondKernel, BondLaw};
+pub use families::{Body, CloudFamilies, Families, LatticeFamilies, Offset};
+pub use states::BondStates;

@@ -1,0 +1,177 @@
+//! The state of each bond: one bit, set while the bond holds.
+//!
+//! On a lattice the bits of [`BLOCK`] consecutive slots and one offset are one word, so that a vector's mask is one
+//! load; on a cloud the bits of [`LANES`] consecutive bonds are one byte. A bond has two bits, one at each end, which
+//! each end's own sum reads and clears; both ends see the same stretch to the last bit and so decide alike.
+
+use super::{Body, Families};
+use crate::geometry::lattice::BLOCK;
+use crate::geometry::{Arrangement, Crack};
+use crate::lane::LANES;
+
+/// One bit for each directed bond.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum BondStates {
+    /// `words[block * offsets + offset]`
+    Lattice(Vec<u16>),
+    /// `bytes[group of LANES bonds]`
+    Cloud(Vec<u8>),
+}
+
+impl BondStates {
+    /// All bonds of a body, whole. On a lattice, bonds to absent points never exist.
+    pub fn whole<const D: usize>(body: &Body<D>) -> Self {
+        match (&body.cloud.arrangement, &body.families) {
+            (Arrangement::Lattice(lattice), Families::Lattice(families)) => {
+                let mut present = vec![0u16; lattice.n_slots / BLOCK];
+                for &slot in &body.cloud.slots {
+                    present[slot as usize / BLOCK] |= 1 << (slot as usize % BLOCK);
+                }
+                let n_offsets = families.offsets.len();
+                let first = lattice.guard / BLOCK;
+                let row_blocks = lattice.counts[0].div_ceil(BLOCK);
+                let mut words = vec![0u16; lattice.n_blocks() * n_offsets];
+                use rayon::prelude::*;
+                words.par_chunks_mut(n_offsets).enumerate().for_each(|(block, words)| {
+                    let here = present[first + block];
+                    if here == 0 {
+                        return;
+                    }
+                    let cell = lattice.cell(lattice.guard + (block / row_blocks) * row_blocks * BLOCK);
+                    let x = (block % row_blocks) as i64 * BLOCK as i64;
+                    for (word, offset) in words.iter_mut().zip(&families.offsets) {
+                        let mut along = offset.step;
+                        along[0] = 0;
+                        let Some(row) = lattice.neighbour(cell, along) else { continue };
+                        let row_first = lattice.slot(row) / BLOCK;
+                        // The sixteen presence bits that start at cell x + step along the row; none outside it.
+                        let start = x + i64::from(offset.step[0]);
+                        let (q, r) = (start.div_euclid(BLOCK as i64), start.rem_euclid(BLOCK as i64));
+                        let at = |q: i64| {
+                            if (0..row_blocks as i64).contains(&q) { present[row_first + q as usize] } else { 0 }
+                        };
+                        let window = (u32::from(at(q)) | u32::from(at(q + 1)) << BLOCK) >> r;
+                        *word = here & window as u16;
+                    }
+                });
+                BondStates::Lattice(words)
+            }
+            (_, Families::Cloud(families)) => {
+                let mut bytes = vec![0u8; families.neighbours.len() / LANES];
+                for point in 0..body.cloud.n_points() {
+                    for bond in families.of(point) {
+                        if families.neighbours[bond] as usize != point {
+                            bytes[bond / LANES] |= 1 << (bond % LANES);
+                        }
+                    }
+                }
+                BondStates::Cloud(bytes)
+            }
+            _ => unreachable!("families are built from the arrangement of their cloud"),
+        }
+    }
+
+    /// Directed bonds that hold.
+    pub fn count(&self) -> u64 {
+        match self {
+            BondStates::Lattice(words) => words.iter().map(|w| u64::from(w.count_ones())).sum(),
+            BondStates::Cloud(bytes) => bytes.iter().map(|b| u64::from(b.count_ones())).sum(),
+        }
+    }
+
+    /// Bonds of each point that hold, in point order.
+    pub fn per_point<const D: usize>(&self, body: &Body<D>) -> Vec<u32> {
+        let slots = body.cloud.slots.iter().map(|&s| s as usize);
+        match (self, &body.families, &body.cloud.arrangement) {
+            (BondStates::Lattice(words), Families::Lattice(families), Arrangement::Lattice(lattice)) => {
+                let n = families.offsets.len();
+                let count = |slot: usize| {
+                    let block = (slot - lattice.guard) / BLOCK;
+                    words[block * n..(block + 1) * n].iter().map(|w| u32::from(w >> (slot % BLOCK) & 1)).sum()
+                };
+                slots.map(count).collect()
+            }
+            (BondStates::Cloud(bytes), Families::Cloud(families), _) => slots
+                .map(|p| {
+                    let groups = families.starts[p] as usize..families.starts[p + 1] as usize;
+                    bytes[groups].iter().map(|b| b.count_ones()).sum()
+                })
+                .collect(),
+            _ => unreachable!("states are built from the families of their body"),
+        }
+    }
+
+    /// The raw words, for hashing and saving.
+    pub fn bytes(&self) -> Vec<u8> {
+        match self {
+            BondStates::Lattice(words) => words.iter().flat_map(|w| w.to_le_bytes()).collect(),
+            BondStates::Cloud(bytes) => bytes.clone(),
+        }
+    }
+
+    /// Breaks every bond that `crack` cuts; returns how many directed bonds it broke. `tolerance` in m: what counts
+    /// as touching (see [`Crack`]).
+    pub fn cut<const D: usize>(&mut self, body: &Body<D>, crack: &Crack<D>, tolerance: f64) -> u64 {
+        let (low, high) = crack.bounds();
+        let reach = match &body.families {
+            Families::Lattice(families) => families.longest(),
+            Families::Cloud(_) => 2.0 * body.horizon,
+        };
+        let near = body.cloud.select(|x| (0..D).all(|d| x[d] >= low[d] - reach && x[d] <= high[d] + reach));
+        let mut cut = 0;
+        for slot in near {
+            let slot = slot as usize;
+            let a = body.cloud.position(slot);
+            self.retain(body, slot, |other| {
+                let keep = !crack.cuts(&a, &body.cloud.position(other), tolerance);
+                cut += u64::from(!keep);
+                keep
+            });
+        }
+        cut
+    }
+
+    /// Clears the bits of the bonds of `slot` that hold now and whose other end `keep` refuses.
+    fn retain<const D: usize>(&mut self, body: &Body<D>, slot: usize, mut keep: impl FnMut(usize) -> bool) {
+        match (self, &body.families, &body.cloud.arrangement) {
+            (BondStates::Lattice(words), Families::Lattice(families), Arrangement::Lattice(lattice)) => {
+                let n = families.offsets.len();
+                let (block, bit) = ((slot - lattice.guard) / BLOCK, slot % BLOCK);
+                for (word, offset) in words[block * n..(block + 1) * n].iter_mut().zip(&families.offsets) {
+                    if *word >> bit & 1 == 1 && !keep(slot.wrapping_add_signed(offset.shift)) {
+                        *word &= !(1 << bit);
+                    }
+                }
+            }
+            (BondStates::Cloud(bytes), Families::Cloud(families), _) => {
+                for bond in families.of(slot) {
+                    let byte = &mut bytes[bond / LANES];
+                    if *byte >> (bond % LANES) & 1 == 1 && !keep(families.neighbours[bond] as usize) {
+                        *byte &= !(1 << (bond % LANES));
+                    }
+                }
+            }
+            _ => unreachable!("states are built from the families of their body"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Cloud, Shape};
+
+    #[test]
+    fn bonds_of_a_disk_join_present_points_only_and_come_in_pairs() {
+        let disk = Shape::Ball { center: [0.0, 0.0], radius: 1.0 };
+        let body = Body::new(Cloud::lattice(&disk, 0.07, 3), 0.21, 0.21 * (1.0 + 1e-9), |_| true);
+        let scattered = Cloud::scattered(
+            body.cloud.slots.iter().map(|&s| body.cloud.position(s as usize)).collect(),
+            vec![0.07 * 0.07; body.cloud.n_points()],
+        );
+        let same = Body::new(scattered, 0.21, 0.21 * (1.0 + 1e-9), |_| true);
+        let whole = BondStates::whole(&body);
+        assert_eq!(whole.count(), BondStates::whole(&same).count());
+        assert_eq!(whole.count() % 2, 0);
+    }
+}

@@ -1,0 +1,87 @@
+//! Values at points: small vectors, flat component-major fields, and the borrowed views that writers see.
+//!
+//! A field of vectors is one flat slice, component after component (`[u_x of all slots, u_y of all slots, …]`), so
+//! that solvers see plain numbers and the bond loops see structure-of-arrays. Deliberately absent: any owner of
+//! fields by name. Names exist for output only.
+
+/// A vector of the space: position, displacement, force. The unit stands where it is used.
+pub type Vector<const D: usize> = [f64; D];
+
+/// a · b
+#[inline]
+pub fn dot<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> f64 {
+    let mut sum = 0.0;
+    for d in 0..D {
+        sum += a[d] * b[d];
+    }
+    sum
+}
+
+/// |a|
+#[inline]
+pub fn norm<const D: usize>(a: &Vector<D>) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// a − b
+#[inline]
+pub fn difference<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> Vector<D> {
+    std::array::from_fn(|d| a[d] - b[d])
+}
+
+/// The components of a flat field of `N` components.
+#[inline]
+pub fn components<const N: usize>(flat: &[f64]) -> [&[f64]; N] {
+    let n = flat.len() / N;
+    std::array::from_fn(|k| &flat[k * n..(k + 1) * n])
+}
+
+/// The components of a flat field of `N` components, to be written.
+#[inline]
+pub fn components_mut<const N: usize>(flat: &mut [f64]) -> [&mut [f64]; N] {
+    let n = flat.len() / N;
+    let mut rest = flat;
+    std::array::from_fn(|_| {
+        let (head, tail) = std::mem::take(&mut rest).split_at_mut(n);
+        rest = tail;
+        head
+    })
+}
+
+/// A vector of dimension `D` as one of three components, zeros behind.
+#[inline]
+pub fn embed<const D: usize>(a: &Vector<D>) -> [f64; 3] {
+    std::array::from_fn(|k| if k < D { a[k] } else { 0.0 })
+}
+
+/// What a field holds, which decides how writers store it and what pictures show of it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// One number a point.
+    Scalar(Vec<f64>),
+    /// Three components a point, zeros beyond the dimension.
+    Vector(Vec<[f64; 3]>),
+}
+
+/// A named field at the points of a body, in point order, with its SI unit (`""` for none).
+#[derive(Debug, Clone)]
+pub struct Field {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub values: Values,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn components_split_a_flat_field_without_overlap() {
+        let mut flat = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let [x, y, z] = components::<3>(&flat);
+        assert_eq!((x, y, z), (&[1.0, 2.0][..], &[3.0, 4.0][..], &[5.0, 6.0][..]));
+        let [_, y] = components_mut::<2>(&mut flat);
+        y[0] = 9.0;
+        assert_eq!(flat, [1.0, 2.0, 3.0, 9.0, 5.0, 6.0]);
+    }
+}

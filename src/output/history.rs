@@ -1,0 +1,116 @@
+//! The history of a run: energies, momenta, broken bonds, crack tip and reactions, a row at a time.
+
+use std::path::PathBuf;
+
+use super::crack_tip::CrackTip;
+use super::source::Source;
+use super::table::Table;
+use crate::error::Result;
+use crate::problem::Balance;
+use crate::solver::Clock;
+
+/// Writes `history.csv` and keeps the extremes that the report needs.
+pub struct History {
+    path: PathBuf,
+    every: u64,
+    table: Option<Table>,
+    last_step: Option<u64>,
+    pub tip: Option<CrackTip>,
+    pub balance: Balance,
+    largest_defect: f64,
+    largest_scale: f64,
+    largest_momentum_defect: f64,
+    largest_momentum_scale: f64,
+}
+
+impl History {
+    pub fn new(path: PathBuf, every: u64, tip: Option<CrackTip>) -> Self {
+        History {
+            path,
+            every,
+            table: None,
+            last_step: None,
+            tip,
+            balance: Balance::default(),
+            largest_defect: 0.0,
+            largest_scale: 0.0,
+            largest_momentum_defect: 0.0,
+            largest_momentum_scale: 0.0,
+        }
+    }
+
+    /// Largest energy defect so far over the largest of the external work and the initial energy so far.
+    pub fn imbalance(&self) -> f64 {
+        if self.largest_scale > 0.0 { self.largest_defect / self.largest_scale } else { 0.0 }
+    }
+
+    /// Largest momentum defect so far over the largest Σ ρ |v| V so far.
+    pub fn momentum_error(&self) -> f64 {
+        if self.largest_momentum_scale > 0.0 { self.largest_momentum_defect / self.largest_momentum_scale } else { 0.0 }
+    }
+
+    /// Adds a row if one is due.
+    pub fn write(&mut self, source: &mut dyn Source, clock: &Clock, last: bool) -> Result<()> {
+        let due = last || clock.step.is_multiple_of(self.every);
+        if !due || self.last_step == Some(clock.step) {
+            return Ok(());
+        }
+        self.last_step = Some(clock.step);
+        let b = source.balance();
+        self.balance = b;
+        self.largest_defect = self.largest_defect.max(b.defect().abs());
+        self.largest_scale = self.largest_scale.max(b.scale());
+        self.largest_momentum_defect = self.largest_momentum_defect.max(b.momentum_defect);
+        self.largest_momentum_scale = self.largest_momentum_scale.max(b.momentum_scale);
+        if let Some(tip) = &mut self.tip {
+            tip.follow(source, clock.time());
+        }
+        let reactions = source.reactions();
+        let dimension = source.facts().dimension;
+        let axes = &["x", "y", "z"][..dimension];
+        if self.table.is_none() {
+            let mut columns: Vec<String> =
+                ["step", "time", "kinetic", "strain", "fracture", "external", "damped", "imbalance", "broken_bonds"]
+                    .map(String::from)
+                    .into();
+            columns.extend(axes.iter().map(|a| format!("momentum_{a}")));
+            // About z in 2D; none in 1D.
+            columns.extend(["x", "y", "z"][angular(dimension)].iter().map(|a| format!("angular_momentum_{a}")));
+            if self.tip.is_some() {
+                columns.extend(axes.iter().map(|a| format!("crack_tip_{a}")));
+                columns.push("crack_tip_speed".into());
+            }
+            columns.extend(reactions.iter().map(|(name, _)| format!("reaction_{name}")));
+            self.table = Some(Table::create(&self.path, &columns)?);
+        }
+        let relative = if b.scale() > 0.0 { b.defect() / b.scale() } else { 0.0 };
+        let mut row = vec![
+            clock.step as f64,
+            clock.time(),
+            b.kinetic,
+            b.strain,
+            b.fracture,
+            b.external,
+            b.damped,
+            relative,
+            source.broken_pairs() as f64,
+        ];
+        row.extend(&b.momentum[..dimension]);
+        row.extend(&b.angular_momentum[angular(dimension)]);
+        if let Some(tip) = &self.tip {
+            row.extend(&tip.position.unwrap_or([f64::NAN; 3])[..dimension]);
+            row.push(tip.speed);
+        }
+        row.extend(reactions.iter().map(|(_, value)| value));
+        self.table.as_mut().map_or(Ok(()), |table| table.row(&row))
+    }
+}
+
+/// The components of angular momentum that exist in a dimension.
+fn angular(dimension: usize) -> std::ops::Range<usize> {
+    match dimension {
+        1 => 0..0,
+        2 => 2..3,
+        _ => 0..3,
+    }
+}

@@ -1,0 +1,98 @@
+//! `report.json`: what a run was and how it ended. Its keys are a stable interface; `docs/report.md` explains each.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+/// The report of a run; SI units.
+#[derive(Debug, Clone, Serialize, PartialEq)]
+pub struct Report {
+    pub title: String,
+    /// Version of the program.
+    pub version: String,
+    /// `done`, `interrupted` or `stopped`.
+    pub status: String,
+    pub dimension: usize,
+    pub points: usize,
+    /// Directed bonds at the start, pre-cracks taken out.
+    pub bonds: u64,
+    /// Directed bonds that pre-cracks cut.
+    pub cut_bonds: u64,
+    /// m
+    pub horizon: f64,
+    pub spacing: f64,
+    /// N/m⁶ in 3D, N/m⁵ in 2D, N/m⁴ in 1D
+    pub micromodulus: f64,
+    /// The smallest of the body; null if bonds never break.
+    pub critical_stretch: Option<f64>,
+    pub steps: u64,
+    /// s
+    pub time_step: f64,
+    pub stable_time_step: f64,
+    pub end_time: f64,
+    pub threads: usize,
+    pub wall_seconds: WallSeconds,
+    /// Directed bonds × steps over the seconds of stepping.
+    pub bond_updates_per_second: f64,
+    /// Null where the system does not tell.
+    pub peak_memory_bytes: Option<u64>,
+    pub energy: Energy,
+    /// Largest energy defect over the largest of external work and initial energy.
+    pub energy_imbalance: f64,
+    /// Largest momentum defect over the largest Σ ρ |v| V.
+    pub momentum_error: f64,
+    /// Pairs broken since the start.
+    pub broken_bonds: u64,
+    /// Points with φ > 0.35.
+    pub damaged_points: usize,
+    pub crack_tip: Option<Tip>,
+    pub state_hash: String,
+}
+
+/// Where the time went.
+#[derive(Debug, Clone, Copy, Serialize, PartialEq, Default)]
+pub struct WallSeconds {
+    pub setup: f64,
+    pub stepping: f64,
+    pub output: f64,
+}
+
+/// Energies at the end, J (2D: J/m).
+#[derive(Debug, Clone, Copy, Serialize, PartialEq, Default)]
+pub struct Energy {
+    pub kinetic: f64,
+    pub strain: f64,
+    pub fracture: f64,
+    pub external: f64,
+    pub damped: f64,
+    pub initial: f64,
+}
+
+/// The crack tip at the end.
+#[derive(Debug, Clone, Serialize, PartialEq)]
+pub struct Tip {
+    /// m; null if nothing is damaged.
+    pub position: Option<Vec<f64>>,
+    /// m/s
+    pub largest_speed: f64,
+    /// c_R, m/s, which no crack in mode I passes; null in 1D.
+    pub rayleigh_speed: Option<f64>,
+}
+
+impl Report {
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let mut text = serde_json::to_string_pretty(self).map_err(|e| Error::io(path, e.into()))?;
+        text.push('\n');
+        std::fs::write(path, text).map_err(|e| Error::io(path, e))
+    }
+}
+
+/// Largest memory that this process has held, if the system tells.
+pub fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024)
+}

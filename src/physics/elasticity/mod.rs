@@ -1,0 +1,178 @@
+//! Elastic bodies that break: ρ ü = Σ μ f(ξ, η) β V′ + b.
+//!
+//! The equation of motion of Silling & Askari (2005), discretised as in Shojaei et al. 2022, eq. (26).
+
+pub mod bond_based;
+pub mod moduli;
+
+use crate::discretization::{BondWeights, Operator};
+use crate::execution::{BreakRule, Broken, Exec};
+use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
+use crate::field::{components, components_mut, difference, norm};
+use crate::geometry::Arrangement;
+use crate::lane::Lane;
+use crate::physics::failure::CriticalStretch;
+
+/// A law, its discretisation and its failure on one body.
+#[derive(Debug, Clone)]
+pub struct Elasticity<L> {
+    pub law: L,
+    /// ρ, kg/m³ (2D: unit thickness; 1D: unit cross-section).
+    pub density: f64,
+    pub operator: Operator,
+    /// None: bonds never break.
+    pub failure: Option<CriticalStretch>,
+}
+
+/// Everything that changes in a run of an elastic body.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// Displacement, m; component after component over all slots.
+    pub displacement: Vec<f64>,
+    /// m/s
+    pub velocity: Vec<f64>,
+    /// Force density: internal, and after the loads are added total; N/m³.
+    pub force: Vec<f64>,
+    /// μ: one bit a directed bond.
+    pub states: BondStates,
+    /// Broken since the start, pre-cracks not counted.
+    pub broken: Broken,
+}
+
+impl<L> Elasticity<L> {
+    /// At rest, all bonds whole.
+    pub fn initial_state<const D: usize>(&self, body: &Body<D>) -> State {
+        let n = D * body.cloud.n_slots();
+        State {
+            displacement: vec![0.0; n],
+            velocity: vec![0.0; n],
+            force: vec![0.0; n],
+            states: BondStates::whole(body),
+            broken: Broken::default(),
+        }
+    }
+
+    /// Breaks the bonds that the displacements overstretch, then fills `state.force` with the internal force density.
+    pub fn evaluate<const D: usize>(&self, body: &Body<D>, exec: &mut Exec, state: &mut State)
+    where
+        L: BondLaw<D>,
+    {
+        let kernel = Force(self.law);
+        let (input, output) = (components::<D>(&state.displacement), components_mut::<D>(&mut state.force));
+        let rule = Breaking::<D, L> { failure: self.failure.as_ref(), law: self.law };
+        let weights = &self.operator.weights;
+        let now = exec.sum_bonds_and_break(body, weights, &mut state.states, input, output, &kernel, &rule);
+        state.broken.bonds += now.bonds;
+        state.broken.energy += now.energy;
+    }
+
+    /// Strain energy density at each slot, W = ½ Σ w β V′ (J/m³); eq. (9).
+    pub fn strain_energy_density<const D: usize>(
+        &self,
+        body: &Body<D>,
+        exec: &mut Exec,
+        state: &State,
+        density: &mut [f64],
+    ) where
+        L: BondLaw<D>,
+    {
+        let input = components::<D>(&state.displacement);
+        exec.sum_bonds(body, &self.operator.weights, &state.states, input, [density], &Energy(self.law));
+    }
+
+    /// Σ β V′ over the bonds that `states` holds, at each slot.
+    pub fn bonded_volume<const D: usize>(
+        &self,
+        body: &Body<D>,
+        exec: &mut Exec,
+        states: &BondStates,
+        volume: &mut [f64],
+    ) {
+        exec.sum_bonds::<D, 0, 1>(body, &self.operator.volumes, states, [], [volume], &Weight);
+    }
+
+    /// Largest stable step of velocity Verlet, s: Δt = √(2ρ / max Σ k β V′), k the spring constant of a bond.
+    ///
+    /// Silling & Askari (2005), by a Gershgorin bound on the spectral radius: never too large for a linear body, and
+    /// for stretches far below one not too large for a nonlinear one either.
+    pub fn stable_step<const D: usize>(&self, body: &Body<D>) -> f64
+    where
+        L: BondLaw<D>,
+    {
+        let stiffest = match (&body.families, &self.operator.weights, &body.cloud.arrangement) {
+            (Families::Lattice(families), BondWeights::Lattice(weights), _) => {
+                families.offsets.iter().zip(weights).map(|(o, w)| self.law.tangent(o.length, *w)).sum::<f64>()
+            }
+            (
+                Families::Cloud(families),
+                BondWeights::Cloud(weights),
+                Arrangement::Scattered { positions, volumes },
+            ) => (0..positions.len())
+                .map(|i| {
+                    let mut sum = 0.0;
+                    for bond in families.of(i) {
+                        let j = families.neighbours[bond] as usize;
+                        if j != i {
+                            let length = norm(&difference(&positions[j], &positions[i]));
+                            sum += self.law.tangent(length, weights.weight(bond, length, volumes[j]));
+                        }
+                    }
+                    sum
+                })
+                .fold(0.0, f64::max),
+            _ => unreachable!("weights are built on the families of their body"),
+        };
+        (2.0 * self.density / stiffest).sqrt()
+    }
+}
+
+/// Σ f
+struct Force<L>(L);
+
+impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, D> for Force<B> {
+    const HOT: bool = true;
+
+    #[inline(always)]
+    fn evaluate<L: Lane>(&self, bond: &Bond<D, L>, here: [L; D], there: [L; D]) -> ([L; D], L) {
+        self.0.force(bond, std::array::from_fn(|d| there[d] - here[d]))
+    }
+}
+
+/// ½ Σ w
+struct Energy<L>(L);
+
+impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, 1> for Energy<B> {
+    #[inline(always)]
+    fn evaluate<L: Lane>(&self, bond: &Bond<D, L>, here: [L; D], there: [L; D]) -> ([L; 1], L) {
+        let energy = self.0.energy(bond, std::array::from_fn(|d| there[d] - here[d]));
+        ([L::splat(0.5) * energy], L::splat(0.0))
+    }
+}
+
+/// Σ of the weights themselves.
+struct Weight;
+
+impl<const D: usize> BondKernel<D, 0, 1> for Weight {
+    #[inline(always)]
+    fn evaluate<L: Lane>(&self, bond: &Bond<D, L>, _: [L; 0], _: [L; 0]) -> ([L; 1], L) {
+        ([bond.weight], L::splat(0.0))
+    }
+}
+
+/// The critical stretch, if bonds can break, together with the law that knows what a broken bond held.
+struct Breaking<'a, const D: usize, L: BondLaw<D>> {
+    failure: Option<&'a CriticalStretch>,
+    law: L,
+}
+
+impl<const D: usize, L: BondLaw<D>> BreakRule for Breaking<'_, D, L> {
+    fn threshold(&self) -> f64 {
+        self.failure.map_or(f64::INFINITY, CriticalStretch::smallest)
+    }
+    fn breaks(&self, here: usize, there: usize, stretch: f64) -> bool {
+        self.failure.is_some_and(|failure| stretch > failure.of(here, there))
+    }
+    fn released(&self, weight: f64, length: f64, stretch: f64) -> f64 {
+        0.5 * self.law.energy_at(length, weight, stretch)
+    }
+}

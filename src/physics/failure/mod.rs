@@ -1,0 +1,5 @@
+//! When bonds break.
+
+pub mod critical_stretch;
+
+pub use critical_stretch::CriticalStretch;

@@ -1,0 +1,6 @@
+//! The physics that a body can have: laws, their states, and what is irreversible in them.
+
+pub mod elasticity;
+pub mod failure;
+
+pub use elasticity::Elasticity;

@@ -1,0 +1,367 @@
+//! A problem: one body, its physics and conditions, and the state that they change. A [`System`] for the solvers.
+//!
+//! It also keeps the books: work and impulse of everything from outside, energy lost to broken bonds and damping, so
+//! that a wrong run is seen at once.
+
+use crate::conditions::{Load, Prescribed};
+use crate::error::{Error, NumericalStop, Result};
+use crate::execution::Exec;
+use crate::family::{Body, BondLaw, BondStates};
+use crate::field::{Field, Values, components, components_mut, embed};
+use crate::physics::elasticity::{Elasticity, State};
+use crate::solver::{Clock, Stage, System, Unknowns, VelocityVerlet};
+
+/// One body, what it is made of, what acts on it, and where it stands.
+pub struct Problem<const D: usize, L> {
+    pub body: Body<D>,
+    pub physics: Elasticity<L>,
+    pub state: State,
+    pub prescribed: Vec<Prescribed>,
+    pub loads: Vec<Load>,
+    /// Σ β V′ over the family before any bond broke, by slot: what damage is measured against.
+    family_volume: Vec<f64>,
+    /// Directed bonds of the body, and how many of them the pre-cracks cut.
+    pub n_bonds: u64,
+    pub n_cut: u64,
+    exec: Exec,
+    ledger: Ledger,
+}
+
+/// What came in and what was lost since the start.
+#[derive(Debug, Clone, Copy, Default)]
+struct Ledger {
+    initial: f64,
+    external: f64,
+    damped: f64,
+    impulse: [f64; 3],
+    initial_momentum: [f64; 3],
+    kinetic: f64,
+}
+
+/// The energies (J; J/m of thickness in 2D, J of a unit cross-section in 1D) and momenta of a body at one instant.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Balance {
+    pub kinetic: f64,
+    pub strain: f64,
+    /// Energy that broken bonds held when they broke.
+    pub fracture: f64,
+    /// Work of loads and prescribed motion.
+    pub external: f64,
+    /// Energy taken by damping.
+    pub damped: f64,
+    /// Kinetic and strain energy at the start.
+    pub initial: f64,
+    /// N·s
+    pub momentum: [f64; 3],
+    /// About the origin, N·m·s.
+    pub angular_momentum: [f64; 3],
+    /// |momentum − initial momentum − impulse from outside|, N·s.
+    pub momentum_defect: f64,
+    /// Σ ρ |v| V: what the momentum defect is measured against, N·s.
+    pub momentum_scale: f64,
+}
+
+impl Balance {
+    /// What is found less what should be there, J.
+    pub fn defect(&self) -> f64 {
+        self.kinetic + self.strain + self.fracture + self.damped - self.initial - self.external
+    }
+
+    /// What a defect is measured against: the larger of the initial energy and the external work, J.
+    pub fn scale(&self) -> f64 {
+        self.initial.max(self.external.abs())
+    }
+}
+
+impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
+    /// `state` holds initial values and broken pre-cracks; `n_cut` directed bonds of these.
+    pub fn new(
+        body: Body<D>,
+        physics: Elasticity<L>,
+        state: State,
+        prescribed: Vec<Prescribed>,
+        loads: Vec<Load>,
+        n_cut: u64,
+    ) -> Self {
+        let mut exec = Exec::default();
+        let mut family_volume = vec![0.0; body.cloud.n_slots()];
+        let n_bonds = state.states.count() + n_cut;
+        physics.bonded_volume(&body, &mut exec, &BondStates::whole(&body), &mut family_volume);
+        let ledger = Ledger::default();
+        Problem { body, physics, state, prescribed, loads, family_volume, n_bonds, n_cut, exec, ledger }
+    }
+
+    /// Evaluates the forces at the start and opens the books.
+    pub fn start(&mut self) {
+        for p in &mut self.prescribed {
+            let c = p.component;
+            let [u, v] = [&mut self.state.displacement, &mut self.state.velocity];
+            p.start(0.0, components_mut::<D>(u)[c], components_mut::<D>(v)[c], components::<D>(&self.state.force)[c]);
+        }
+        self.evaluate(0.0, 0.0);
+        for p in &mut self.prescribed {
+            let c = p.component;
+            let force = components::<D>(&self.state.force)[c];
+            for (&slot, last) in p.slots.iter().zip(&mut p.last) {
+                last[2] = force[slot as usize];
+            }
+        }
+        let now = self.balance();
+        self.ledger.initial = now.kinetic + now.strain + now.fracture;
+        self.ledger.initial_momentum = now.momentum;
+        self.ledger.impulse = [0.0; 3];
+        self.ledger.external = 0.0;
+        self.ledger.kinetic = now.kinetic;
+    }
+
+    /// One step of velocity Verlet, then the watch over its result.
+    pub fn step(&mut self, solver: &VelocityVerlet, clock: &mut Clock) -> Result<()> {
+        solver.step(self, clock);
+        let before = self.ledger.kinetic;
+        let kinetic = self.kinetic();
+        self.ledger.kinetic = kinetic;
+        // Damping takes ρ c v² a second: trapezoidal in time, as the forces.
+        self.ledger.damped += solver.damping * clock.dt * (before + kinetic);
+        self.watch(kinetic, clock)
+    }
+
+    fn kinetic(&mut self) -> f64 {
+        let (cloud, velocity) = (&self.body.cloud, components::<D>(&self.state.velocity));
+        let half_density = 0.5 * self.physics.density;
+        self.exec.sum(cloud.n_points(), |points| {
+            let mut sum = 0.0;
+            for &slot in &cloud.slots[points] {
+                let slot = slot as usize;
+                let mut square = 0.0;
+                for v in velocity {
+                    square += v[slot] * v[slot];
+                }
+                sum += square * cloud.volume(slot);
+            }
+            [half_density * sum, 0.0, 0.0, 0.0]
+        })[0]
+    }
+
+    /// Stops on values that are not finite, and on kinetic energy that nothing can have put in.
+    fn watch(&self, kinetic: f64, clock: &Clock) -> Result<()> {
+        let stable = self.stable_step();
+        let cause = || {
+            if clock.dt > stable {
+                format!("the time step {:.3e} s is above the stable step {stable:.3e} s", clock.dt)
+            } else {
+                "bonds turned inside out, by loads or prescribed values too large for this step; try a smaller step"
+                    .to_string()
+            }
+        };
+        let stop = |field, value, point: Option<usize>| {
+            let point = point.map(|i| {
+                let x = self.body.cloud.position(self.body.cloud.slots[i] as usize);
+                (i, x.to_vec())
+            });
+            Error::Numbers(Box::new(NumericalStop {
+                step: clock.step,
+                time: clock.time(),
+                field,
+                value,
+                point,
+                cause: cause(),
+            }))
+        };
+        if !kinetic.is_finite() {
+            for (field, flat) in [
+                ("displacement", &self.state.displacement),
+                ("force density", &self.state.force),
+                ("velocity", &self.state.velocity),
+            ] {
+                for component in components::<D>(flat) {
+                    let bad = self.body.cloud.slots.iter().position(|&s| !component[s as usize].is_finite());
+                    if let Some(point) = bad {
+                        let value = component[self.body.cloud.slots[point] as usize];
+                        return Err(stop(field, value, Some(point)));
+                    }
+                }
+            }
+            return Err(stop("kinetic energy", kinetic, None));
+        }
+        // Kinetic energy cannot pass what came in; a factor of ten leaves room for the error of a coarse step.
+        let available = self.ledger.initial + self.ledger.external.abs() + self.state.broken.energy;
+        if kinetic > 10.0 * available && clock.step > 2 {
+            let velocity = components::<D>(&self.state.velocity);
+            let speed = |&slot: &u32| velocity.iter().map(|v| v[slot as usize].powi(2)).sum::<f64>();
+            let worst = (0..self.body.cloud.n_points())
+                .max_by(|&a, &b| speed(&self.body.cloud.slots[a]).total_cmp(&speed(&self.body.cloud.slots[b])));
+            return Err(stop("kinetic energy (J, runaway)", kinetic, worst));
+        }
+        Ok(())
+    }
+
+    /// The energies and momenta now.
+    pub fn balance(&mut self) -> Balance {
+        let mut density = vec![0.0; self.body.cloud.n_slots()];
+        self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
+        let (cloud, rho) = (&self.body.cloud, self.physics.density);
+        let (u, v) = (components::<D>(&self.state.displacement), components::<D>(&self.state.velocity));
+        let n = cloud.n_points();
+        let [strain, scale, ..] = self.exec.sum(n, |points| {
+            let (mut strain, mut scale) = (0.0, 0.0);
+            for &slot in &cloud.slots[points] {
+                let slot = slot as usize;
+                let volume = cloud.volume(slot);
+                strain += density[slot] * volume;
+                scale += rho * volume * v.iter().map(|v| v[slot] * v[slot]).sum::<f64>().sqrt();
+            }
+            [strain, scale, 0.0, 0.0]
+        });
+        let momentum_of = |slot: usize| -> [f64; 3] {
+            let mass = rho * cloud.volume(slot);
+            embed::<D>(&std::array::from_fn(|d| mass * v[d][slot]))
+        };
+        let sums = self.exec.sum(n, |points| {
+            let mut sum = [0.0; 4];
+            for &slot in &cloud.slots[points] {
+                let p = momentum_of(slot as usize);
+                for d in 0..3 {
+                    sum[d] += p[d];
+                }
+            }
+            sum
+        });
+        let angular = self.exec.sum(n, |points| {
+            let mut sum = [0.0; 4];
+            for &slot in &cloud.slots[points] {
+                let slot = slot as usize;
+                let x = cloud.position(slot);
+                let y = embed::<D>(&std::array::from_fn(|d| x[d] + u[d][slot]));
+                let p = momentum_of(slot);
+                for d in 0..3 {
+                    let (a, b) = ((d + 1) % 3, (d + 2) % 3);
+                    sum[d] += y[a] * p[b] - y[b] * p[a];
+                }
+            }
+            sum
+        });
+        let momentum = [sums[0], sums[1], sums[2]];
+        let kinetic = self.kinetic();
+        let ledger = &self.ledger;
+        let defect: f64 = (0..3).map(|d| (momentum[d] - ledger.initial_momentum[d] - ledger.impulse[d]).powi(2)).sum();
+        Balance {
+            kinetic,
+            strain,
+            fracture: self.state.broken.energy,
+            external: ledger.external,
+            damped: ledger.damped,
+            initial: ledger.initial,
+            momentum,
+            angular_momentum: [angular[0], angular[1], angular[2]],
+            momentum_defect: defect.sqrt(),
+            momentum_scale: scale,
+        }
+    }
+
+    /// φ at each point: 1 − Σ μ β V′ / Σ β V′; Shojaei et al. 2022, eq. (21).
+    pub fn damage(&mut self) -> Vec<f64> {
+        let mut now = vec![0.0; self.body.cloud.n_slots()];
+        self.physics.bonded_volume(&self.body, &mut self.exec, &self.state.states, &mut now);
+        self.body
+            .cloud
+            .slots
+            .iter()
+            .map(|&slot| {
+                let (now, whole) = (now[slot as usize], self.family_volume[slot as usize]);
+                if whole > 0.0 { 1.0 - now / whole } else { 0.0 }
+            })
+            .collect()
+    }
+
+    /// A field by name, in point order; None if there is no such field.
+    pub fn field(&mut self, name: &str) -> Option<Field> {
+        let slots = &self.body.cloud.slots;
+        let vector = |flat: &[f64]| {
+            let parts = components::<D>(flat);
+            Values::Vector(slots.iter().map(|&s| embed::<D>(&std::array::from_fn(|d| parts[d][s as usize]))).collect())
+        };
+        let (name, unit, values) = match name {
+            "displacement" => ("displacement", "m", vector(&self.state.displacement)),
+            "velocity" => ("velocity", "m/s", vector(&self.state.velocity)),
+            "force" => ("force", "N/m³", vector(&self.state.force)),
+            "damage" => ("damage", "", Values::Scalar(self.damage())),
+            "strain_energy" => {
+                let mut density = vec![0.0; self.body.cloud.n_slots()];
+                self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
+                let slots = &self.body.cloud.slots;
+                ("strain_energy", "J/m³", Values::Scalar(slots.iter().map(|&s| density[s as usize]).collect()))
+            }
+            _ => return None,
+        };
+        Some(Field { name, unit, values })
+    }
+
+    /// BLAKE3 of displacements, velocities and bond states: equal exactly when two runs have the same bits.
+    pub fn hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for flat in [&self.state.displacement, &self.state.velocity] {
+            for component in components::<D>(flat) {
+                for &slot in &self.body.cloud.slots {
+                    hasher.update(&component[slot as usize].to_le_bytes());
+                }
+            }
+        }
+        hasher.update(&self.state.states.bytes());
+        hasher.finalize().to_hex().to_string()
+    }
+
+    /// Broken pairs, pre-cracks not counted.
+    pub fn broken_pairs(&self) -> u64 {
+        self.state.broken.bonds / 2
+    }
+}
+
+/// The fields that [`Problem::field`] knows.
+pub const FIELDS: [&str; 5] = ["displacement", "velocity", "force", "damage", "strain_energy"];
+
+impl<const D: usize, L: BondLaw<D>> System for Problem<D, L> {
+    fn unknowns(&mut self) -> Unknowns<'_> {
+        Unknowns {
+            displacement: &mut self.state.displacement,
+            velocity: &mut self.state.velocity,
+            force: &self.state.force,
+            inertia: self.physics.density,
+        }
+    }
+
+    fn constrain(&mut self, stage: Stage, t: f64, dt: f64) {
+        let State { displacement, velocity, force, .. } = &mut self.state;
+        for p in &mut self.prescribed {
+            let c = p.component;
+            let u = components::<D>(displacement)[c];
+            let v = &mut *components_mut::<D>(velocity)[c];
+            match stage {
+                Stage::Drift => p.drift(t, dt, u, v),
+                Stage::Finish => {
+                    let force = components::<D>(force)[c];
+                    let cloud = &self.body.cloud;
+                    let done = p.finish(t, dt, self.physics.density, u, v, force, |slot| cloud.volume(slot));
+                    self.ledger.external += done.work;
+                    self.ledger.impulse[c] += done.impulse;
+                }
+            }
+        }
+    }
+
+    fn evaluate(&mut self, t: f64, dt: f64) {
+        self.physics.evaluate(&self.body, &mut self.exec, &mut self.state);
+        let cloud = &self.body.cloud;
+        for load in &mut self.loads {
+            let c = load.component;
+            let u = components::<D>(&self.state.displacement)[c];
+            let force = &mut *components_mut::<D>(&mut self.state.force)[c];
+            let done = load.apply(t, dt, u, force, |slot| cloud.volume(slot));
+            self.ledger.external += done.work;
+            self.ledger.impulse[c] += done.impulse;
+        }
+    }
+
+    fn stable_step(&self) -> f64 {
+        self.physics.stable_step(&self.body)
+    }
+}

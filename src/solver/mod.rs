@@ -1,0 +1,50 @@
+//! How time advances. A solver sees flat vectors and a right-hand side, never a point, a bond or a material.
+
+pub mod velocity_verlet;
+
+pub use velocity_verlet::VelocityVerlet;
+
+/// The vectors that a solver of second order advances: ρ ü = force − ρ c u̇.
+pub struct Unknowns<'a> {
+    pub displacement: &'a mut [f64],
+    pub velocity: &'a mut [f64],
+    /// Force density at the current displacements.
+    pub force: &'a [f64],
+    /// ρ
+    pub inertia: f64,
+}
+
+/// Where a run stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clock {
+    pub step: u64,
+    /// Δt, s
+    pub dt: f64,
+}
+
+impl Clock {
+    /// t, s: a product, not a sum, so that it does not drift.
+    pub fn time(&self) -> f64 {
+        self.step as f64 * self.dt
+    }
+}
+
+/// When constraints are asked to act within a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Before the drift: set the velocities of the step.
+    Drift,
+    /// After the last kick: set the velocities at the end of the step.
+    Finish,
+}
+
+/// What a solver advances.
+pub trait System {
+    fn unknowns(&mut self) -> Unknowns<'_>;
+    /// Imposes prescribed values; `t` is the time at the start of the step for `Drift`, at its end for `Finish`.
+    fn constrain(&mut self, stage: Stage, t: f64, dt: f64);
+    /// Breaks what breaks at the current displacements and fills the force density at time `t`, `dt` after the last.
+    fn evaluate(&mut self, t: f64, dt: f64);
+    /// Largest stable step of an explicit solver, s.
+    fn stable_step(&self) -> f64;
+}
