@@ -43,7 +43,7 @@ struct Ledger {
 pub struct Balance {
     pub kinetic: f64,
     pub strain: f64,
-    /// Energy that broken bonds held when they broke.
+    /// Energy that broken bonds took with them.
     pub fracture: f64,
     /// Work of loads and prescribed motion.
     pub external: f64,
@@ -349,7 +349,7 @@ impl<const D: usize, L: BondLaw<D>> System for Problem<D, L> {
     }
 
     fn evaluate(&mut self, t: f64, dt: f64) {
-        self.physics.evaluate(&self.body, &mut self.exec, &mut self.state);
+        self.physics.evaluate(&self.body, &mut self.exec, &mut self.state, dt);
         let cloud = &self.body.cloud;
         for load in &mut self.loads {
             let c = load.component;

@@ -17,7 +17,7 @@ pub const CHUNK: usize = 512;
 
 /// Sums the families of a range of points.
 #[allow(clippy::too_many_arguments)]
-pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule>(
+pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
     body: &Body<D>,
     families: &CloudFamilies,
     weights: &CloudWeights,
@@ -67,7 +67,7 @@ pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, 
                     if holds && s > rule.threshold() && rule.breaks(point, neighbours[k] as usize, s) {
                         *byte &= !(1 << k);
                         broken.bonds += 1;
-                        broken.energy += volumes[point] * rule.released(bond.weight, bond.length, s);
+                        broken.energy += volumes[point] * rule.released(bond, point, neighbours[k] as usize);
                     }
                 }
             }

@@ -36,7 +36,7 @@ impl<'a, const D: usize> View<'a, D> {
 }
 
 /// Sums the blocks of one chunk, on the widest instructions that this machine has.
-pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule>(
+pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
     view: &View<'_, D>,
     chunk: usize,
     states: StatesPointer,
@@ -61,7 +61,7 @@ pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, 
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw")]
-fn pass_avx512<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule>(
+fn pass_avx512<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
     view: &View<'_, D>,
     chunk: usize,
     states: StatesPointer,
@@ -75,7 +75,7 @@ fn pass_avx512<const D: usize, const I: usize, const O: usize, K: BondKernel<D, 
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn pass_avx2<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule>(
+fn pass_avx2<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
     view: &View<'_, D>,
     chunk: usize,
     states: StatesPointer,
@@ -88,7 +88,7 @@ fn pass_avx2<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I,
 }
 
 #[inline(always)]
-fn pass_plain<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule>(
+fn pass_plain<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
     view: &View<'_, D>,
     chunk: usize,
     states: StatesPointer,
@@ -224,7 +224,7 @@ unsafe fn load(field: &[f64], slot: usize) -> Pack {
 /// Asks each whole bond of a block whether it breaks, and clears its bit if so.
 #[cold]
 #[inline(never)]
-fn break_block<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule>(
+fn break_block<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
     view: &View<'_, D>,
     words: &mut [u16],
     slot: usize,
@@ -246,7 +246,7 @@ fn break_block<const D: usize, const I: usize, const O: usize, K: BondKernel<D, 
             if stretch > rule.threshold() && rule.breaks(here, there, stretch) {
                 *word &= !(1 << bit);
                 broken.bonds += 1;
-                broken.energy += volume * rule.released(bond.weight, bond.length, stretch);
+                broken.energy += volume * rule.released(&bond, here, there);
             }
         }
     }

@@ -11,29 +11,29 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::discretization::BondWeights;
-use crate::family::{Body, BondKernel, BondStates, Families};
+use crate::family::{Body, Bond, BondKernel, BondStates, Families};
 
 /// Which bonds break: asked only about bonds stretched beyond `threshold`.
-pub trait BreakRule: Sync {
+pub trait BreakRule<const D: usize>: Sync {
     /// No bond whose stretch is at most this can break.
     fn threshold(&self) -> f64;
     /// Whether the bond between two slots breaks at this stretch. Must be symmetric in the slots.
     fn breaks(&self, here: usize, there: usize, stretch: f64) -> bool;
-    /// Energy that a breaking bond releases on this side, J/m³ per unit of the point's volume.
-    fn released(&self, weight: f64, length: f64, stretch: f64) -> f64;
+    /// Energy that a breaking bond takes with it on this side, J per unit of the point's volume.
+    fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64;
 }
 
 /// Nothing breaks.
 pub struct Unbreakable;
 
-impl BreakRule for Unbreakable {
+impl<const D: usize> BreakRule<D> for Unbreakable {
     fn threshold(&self) -> f64 {
         f64::INFINITY
     }
     fn breaks(&self, _: usize, _: usize, _: f64) -> bool {
         false
     }
-    fn released(&self, _: f64, _: f64, _: f64) -> f64 {
+    fn released(&self, _: &Bond<D, f64>, _: usize, _: usize) -> f64 {
         0.0
     }
 }
@@ -85,7 +85,7 @@ impl Exec {
         input: [&[f64]; I],
         output: [&mut [f64]; O],
         kernel: &impl BondKernel<D, I, O>,
-        rule: &impl BreakRule,
+        rule: &impl BreakRule<D>,
     ) -> Broken {
         self.pass(body, weights, StatesPointer::exclusive(states), input, output, kernel, rule)
     }
@@ -99,7 +99,7 @@ impl Exec {
         input: [&[f64]; I],
         output: [&mut [f64]; O],
         kernel: &impl BondKernel<D, I, O>,
-        rule: &impl BreakRule,
+        rule: &impl BreakRule<D>,
     ) -> Broken {
         let n = body.cloud.n_slots();
         assert!(input.iter().all(|f| f.len() == n), "input fields have the length of the cloud");

@@ -33,6 +33,4 @@ pub trait BondLaw<const D: usize>: Copy + Send + Sync {
     fn energy<L: Lane>(&self, bond: &Bond<D, L>, eta: [L; D]) -> L;
     /// Spring constant of the bond at rest, weighted: derivative of the force along ξ by η along ξ.
     fn tangent(&self, length: f64, weight: f64) -> f64;
-    /// Energy density that a bond of this stretch releases when it breaks, weighted.
-    fn energy_at(&self, length: f64, weight: f64, stretch: f64) -> f64;
 }

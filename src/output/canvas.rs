@@ -265,14 +265,12 @@ pub(super) fn shortened(text: &str, size: f64, width: f64) -> String {
     if text_width(text, size) <= width {
         return text.to_owned();
     }
-    let mut kept: Vec<char> = text.chars().collect();
-    while kept.pop().is_some() {
-        let short: String = kept.iter().chain(&['…']).collect();
-        if text_width(&short, size) <= width {
-            return short;
-        }
-    }
-    String::new()
+    let ends: Vec<usize> = text.char_indices().map(|(end, _)| end).collect();
+    let short = |end: usize| format!("{}…", text[..end].trim_end());
+    let fitting = ends.partition_point(|end| text_width(&short(*end), size) <= width);
+    fitting
+        .checked_sub(1)
+        .map_or_else(String::new, |i| short(ends[i]))
 }
 
 /// The text in lines that are no wider than `width`, broken between words.
@@ -328,7 +326,10 @@ fn cut(from: [f64; 2], to: [f64; 2], clip: Area, margin: f64) -> Option<[[f64; 2
         return None;
     }
     let low = [clip.left - margin, clip.top - margin];
-    let high = [clip.right + margin, clip.bottom + margin];
+    let high = [
+        (clip.right + margin).max(low[0]),
+        (clip.bottom + margin).max(low[1]),
+    ];
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     for k in 0..2 {
         let along = to[k] - from[k];
@@ -346,7 +347,9 @@ fn cut(from: [f64; 2], to: [f64; 2], clip: Area, margin: f64) -> Option<[[f64; 2
     if enter.is_nan() || leave.is_nan() || enter > leave {
         return None;
     }
-    let at = |share: f64| [0, 1].map(|k| from[k] + share * (to[k] - from[k]));
+    // Between huge numbers, rounding alone would leave the picture by far.
+    let at =
+        |share: f64| [0, 1].map(|k| (from[k] + share * (to[k] - from[k])).clamp(low[k], high[k]));
     let ends = [at(enter), at(leave)];
     ends.as_flattened()
         .iter()
@@ -425,12 +428,14 @@ mod tests {
         let all = everywhere(&image);
         for bad in [f64::NAN, f64::INFINITY, 1e300] {
             image.line([bad, 1.0], [bad, 30.0], 2.0, BLACK, all);
-            image.line([-bad, bad], [bad, -bad], 2.0, BLACK, all);
             image.disc([bad, 3.0], 4.0, BLACK);
         }
         assert_eq!(image, Image::white(50, 50));
         image.line([-1e12, 25.0], [1e12, 25.0], 2.0, BLACK, all);
         assert_eq!(dark(&image), 100);
+        for huge in [1e12, 1e290, f64::MAX] {
+            image.line([-huge, huge], [huge, -0.3 * huge], 2.0, BLACK, all);
+        }
     }
 
     #[test]
@@ -449,7 +454,7 @@ mod tests {
         };
         let width = text_width("σ [MPa], t = 42.9 µs · 10⁻³", 20.0);
         let (first, last) = columns(&image);
-        assert!(first >= 10 && first < 15, "{first}");
+        assert!((10..15).contains(&first), "{first}");
         assert!(last < (10.0 + width) as usize + 1 && last + 5 > (10.0 + width) as usize);
         assert_eq!(shortened("abc", 20.0, 1.0), "");
         assert!(shortened("a long sentence", 20.0, 80.0).ends_with('…'));

@@ -16,7 +16,7 @@ pub use super::canvas::{Color, Image, write_png};
 /// How a picture is to look.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Width in pixels, from 120 to 16384; the height follows from the cloud.
+    /// Width in pixels, from 120 to 4096; the height follows from the cloud.
     pub width: u32,
     pub title: String,
     /// What the colours mean, with the unit in brackets: "damage \[-\]".
@@ -140,7 +140,7 @@ fn draw_line(picture: &Picture, cloud: &CloudView<'_>, time: Option<f64>) -> Ima
         }],
         ..Plot::default()
     };
-    let width = picture.width as usize;
+    let width = width_of(picture) as usize;
     draw_plot(&plot, width, width / 2)
 }
 
@@ -228,8 +228,11 @@ fn draw_solid(picture: &Picture, cloud: &CloudView<'_>, time: Option<f64>) -> Im
     image
 }
 
+/// Drawn at twice the resolution, with depths, this takes a gigabyte.
+const WIDEST: usize = 4096;
+
 fn width_of(picture: &Picture) -> f64 {
-    (picture.width as usize).clamp(PIXELS.0, PIXELS.1) as f64
+    (picture.width as usize).clamp(PIXELS.0, WIDEST) as f64
 }
 
 fn said(time: Option<f64>) -> String {
@@ -492,5 +495,240 @@ fn paste_halved(image: &mut Image, area: Area, pixels: &[Color]) {
             let color = [0, 1, 2].map(|k| mean(k) as u8);
             image.pixels[(top + row) * image.width + left + column] = color;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::files::tests::folder;
+    use std::fs::{self, File};
+    use std::io::BufReader;
+
+    /// A lattice of `n` by `m` points of spacing 0.1 mm and a value for each.
+    fn lattice(
+        n: usize,
+        m: usize,
+        value: impl Fn(usize, usize) -> f64,
+    ) -> (Vec<[f64; 3]>, Vec<f64>) {
+        let indices = || (0..n * m).map(|i| (i % n, i / n));
+        let at = |i: usize| (i as f64 + 0.5) * 1e-4;
+        (
+            indices().map(|(i, j)| [at(i), at(j), 0.0]).collect(),
+            indices().map(|(i, j)| value(i, j)).collect(),
+        )
+    }
+
+    fn viridis(share: f64) -> Color {
+        colorous::VIRIDIS.eval_continuous(share).as_array()
+    }
+
+    fn near(a: Color, b: Color) -> bool {
+        a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 3)
+    }
+
+    /// The data area of a picture of this cloud.
+    fn area(picture: &Picture, cloud: &CloudView<'_>) -> (Image, Vec<(usize, usize)>) {
+        let image = draw(picture, cloud, Some(1e-6));
+        let low = viridis(0.0);
+        let found = (0..image.pixels.len())
+            .filter(|i| near(image.pixels[*i], low))
+            .map(|i| (i % image.width, i / image.width))
+            .collect();
+        (image, found)
+    }
+
+    #[test]
+    fn a_lattice_of_one_value_is_one_rectangle_without_gaps() {
+        // Shapes and widths by which edges of squares fall anywhere between pixels.
+        for (n, m, width) in [(7, 5, 400), (64, 64, 500), (301, 120, 640), (700, 400, 333)] {
+            let (positions, values) = lattice(n, m, |_, _| 0.0);
+            let cloud = CloudView {
+                positions: &positions,
+                sizes: Sizes::Same(1e-4),
+                values: &values,
+                dimension: 2,
+            };
+            let picture = Picture {
+                width,
+                range: Some((0.0, 1.0)),
+                ..Picture::default()
+            };
+            let (_, mut found) = area(&picture, &cloud);
+            // The colour bar, at the right, begins with the same colour.
+            let middle = found[found.len() / 2].1;
+            let row: Vec<usize> = found
+                .iter()
+                .filter(|p| p.1 == middle)
+                .map(|p| p.0)
+                .collect();
+            let is_last = |x: &&usize| !row.contains(&(**x + 1));
+            let end = *row.iter().find(is_last).unwrap() + 1;
+            found.retain(|p| p.0 < end);
+            let ends = |get: fn(&(usize, usize)) -> usize| {
+                let all = || found.iter().map(get);
+                (all().min().unwrap(), all().max().unwrap())
+            };
+            let (left, right) = ends(|p| p.0);
+            let (top, bottom) = ends(|p| p.1);
+            let (across, upright) = (right - left + 1, bottom - top + 1);
+            assert_eq!(found.len(), across * upright, "{n} x {m} at {width}");
+            let aspect = across as f64 / upright as f64;
+            let expected = n as f64 / m as f64;
+            assert!(
+                (aspect / expected - 1.0).abs() < 0.03,
+                "{aspect} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn each_point_has_the_colour_of_its_value_also_after_encoding() {
+        let (positions, values) = lattice(4, 4, |i, j| match (i, j) {
+            (0, 0) => 0.0,
+            (3, 0) => 1.0,
+            (0, 3) => f64::NAN,
+            (3, 3) => 7.0,
+            _ => 0.5,
+        });
+        let cloud = CloudView {
+            positions: &positions,
+            sizes: Sizes::Same(1e-4),
+            values: &values,
+            dimension: 2,
+        };
+        let picture = Picture {
+            range: Some((0.0, 1.0)),
+            label: "damage [-]".into(),
+            ..Picture::default()
+        };
+        let folder = folder("picture");
+        let path = folder.join("a.png");
+        write_png(&draw(&picture, &cloud, None), &path).unwrap();
+        let decoder = png::Decoder::new(BufReader::new(File::open(&path).unwrap()));
+        let mut reader = decoder.read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut bytes).unwrap();
+        let (width, height) = (info.width as usize, info.height as usize);
+        let pixel =
+            |x: usize, y: usize| -> Color { bytes[3 * (y * width + x)..][..3].try_into().unwrap() };
+        let page = Page::new(
+            &picture,
+            None,
+            [4.16e-4, 4.16e-4],
+            &ColorScale::new(&picture, &values),
+            60.0,
+            50.0,
+        );
+        // Any picture of a square has its data in this band; look along a row through
+        // the lowest points and one through the highest.
+        let x_of = |i: usize| page.area.left + page.area.width() * (i as f64 + 0.58) / 4.16;
+        let y_of = |j: usize| page.area.bottom - page.area.height() * (j as f64 + 0.58) / 4.16;
+        let at = |i: usize, j: usize| pixel(x_of(i) as usize, y_of(j) as usize);
+        assert!(near(at(0, 0), viridis(0.0)), "{:?}", at(0, 0));
+        assert!(near(at(3, 0), viridis(1.0)));
+        assert!(
+            near(at(3, 3), viridis(1.0)),
+            "beyond the range: its last colour"
+        );
+        assert!(near(at(1, 2), viridis(0.5)));
+        assert_eq!(at(0, 3), NO_VALUE);
+        // The colour bar: somewhere right of the data a column runs through all colours.
+        let has_all = |x: &usize| {
+            [0.02, 0.3, 0.5, 0.7, 0.98]
+                .iter()
+                .all(|share| (0..height).any(|y| near(pixel(*x, y), viridis(*share))))
+        };
+        assert!((width * 3 / 4..width).any(|x| has_all(&x)));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_diverging_map_puts_white_at_zero_and_red_above() {
+        let picture = Picture {
+            color_map: ColorMap::Diverging,
+            ..Picture::default()
+        };
+        let scale = ColorScale::new(&picture, &[-1.0, 4.0]);
+        assert!(scale.color(0.0).iter().all(|channel| *channel > 235));
+        assert!(scale.color(4.0)[0] > scale.color(4.0)[2]);
+        assert_eq!(scale.color(f64::NAN), NO_VALUE);
+        assert_eq!(scale.color(f64::INFINITY), scale.color(4.0));
+    }
+
+    #[test]
+    fn no_cloud_stops_a_picture_from_being_drawn() {
+        let bad = [0.0, 1.0, -1e-300, f64::MAX, f64::NAN, f64::INFINITY];
+        let all: Vec<[f64; 3]> = bad
+            .iter()
+            .flat_map(|&a| bad.iter().map(move |&b| [a, b, a]))
+            .collect();
+        let clouds: [&[[f64; 3]]; 4] = [&[], &all[..1], &all[7..9], &all];
+        for dimension in 1..4 {
+            for positions in clouds {
+                for size in bad {
+                    for (values, range) in [
+                        (&bad[..0], None),
+                        (&bad[..], Some((1.0, 0.0))),
+                        (&bad[..], Some((f64::NAN, f64::MAX))),
+                        (&[f64::NAN; 60][..], Some((2.0, 2.0))),
+                    ] {
+                        let picture = Picture {
+                            width: 120,
+                            range,
+                            title: "title ".repeat(9),
+                            label: "[[label]".repeat(7),
+                            view: View {
+                                azimuth: size,
+                                elevation: 90.0,
+                            },
+                            bounds: (size == 1.0).then_some([[0.0; 3], [size; 3]]),
+                            ..Picture::default()
+                        };
+                        let sizes = if range.is_none() {
+                            Sizes::Each(&bad)
+                        } else {
+                            Sizes::Same(size)
+                        };
+                        let cloud = CloudView {
+                            positions,
+                            sizes,
+                            values,
+                            dimension,
+                        };
+                        draw(&picture, &cloud, Some(size));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn given_bounds_keep_the_scale_while_the_body_moves() {
+        let (mut positions, values) = lattice(40, 20, |_, _| 0.0);
+        let picture = Picture {
+            bounds: Some([[-1e-3, -1e-3, 0.0], [6e-3, 4e-3, 0.0]]),
+            ..Picture::default()
+        };
+        let inked = |positions: &[[f64; 3]]| {
+            let cloud = CloudView {
+                positions,
+                sizes: Sizes::Same(1e-4),
+                values: &values,
+                dimension: 2,
+            };
+            let (image, found) = area(&picture, &cloud);
+            (image.width, image.height, found.len())
+        };
+        let before = inked(&positions);
+        for position in &mut positions {
+            position[0] += 1e-3;
+        }
+        let after = inked(&positions);
+        assert_eq!((before.0, before.1), (after.0, after.1));
+        assert!(
+            before.2.abs_diff(after.2) < before.2 / 50,
+            "{before:?} {after:?}"
+        );
     }
 }

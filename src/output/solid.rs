@@ -450,3 +450,134 @@ pub(super) fn draw_length(image: &mut Image, strip: Area, per_length: f64, measu
     let at = [0.5 * (bar.left + bar.right), bar.top - measure.number()];
     image.text(at, &quantity(length, "m"), lettering);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::picture::{Picture, Sizes, draw};
+
+    /// A block of `n` points along each edge, spacing 1.
+    fn block(n: usize) -> Vec<[f64; 3]> {
+        (0..n * n * n)
+            .map(|i| [i % n, i / n % n, i / (n * n)].map(|c| c as f64))
+            .collect()
+    }
+
+    fn canvas(view: View, positions: &[[f64; 3]], size: f64) -> (Depths, Screen) {
+        let cloud = CloudView {
+            positions,
+            sizes: Sizes::Same(size),
+            values: &[],
+            dimension: 3,
+        };
+        let sight = Sight::new(view);
+        let shown = sight.extent(&cloud, None);
+        let screen = Screen {
+            columns: 200,
+            rows: 200,
+            centre: shown.map(|[low, high]| 0.5 * (low + high)),
+            per_length: 200.0 / (shown[0][1] - shown[0][0]).max(shown[1][1] - shown[1][0]),
+        };
+        let mut depths = Depths::new(&screen);
+        let cube = Cube::new(&sight);
+        for slab in from_front_to_back(&sight, &screen, &cloud) {
+            for splat in slab {
+                depths.draw(&splat, &cube);
+            }
+            depths.close_blocks();
+        }
+        (depths, screen)
+    }
+
+    #[test]
+    fn a_block_covers_the_area_of_its_three_faces_without_holes() {
+        let n = 20;
+        for (azimuth, elevation) in [(-60.0, 30.0), (0.0, 0.0), (17.0, 90.0), (200.0, -35.0)] {
+            let view = View { azimuth, elevation };
+            let (depths, screen) = canvas(view, &block(n), 1.0);
+            let covered = depths.depth.iter().filter(|d| **d != NOTHING).count() as f64;
+            let sight = Sight::new(view);
+            // Each face appears with the cosine of its angle to the sight.
+            let seen: f64 = sight.towards.iter().map(|c| c.abs()).sum();
+            let expected = seen * (n as f64 * screen.per_length).powi(2);
+            assert!(
+                (covered / expected - 1.0).abs() < 0.04,
+                "{view:?}: {covered} {expected}"
+            );
+            // No hole: in each row what is covered is one run.
+            for row in depths.depth.chunks(depths.columns) {
+                let changes = row
+                    .windows(2)
+                    .filter(|p| (p[0] == NOTHING) != (p[1] == NOTHING));
+                assert!(changes.count() <= 2, "{view:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn skipping_what_is_hidden_changes_no_pixel() {
+        let positions = block(14);
+        let view = View::default();
+        let (fast, screen) = canvas(view, &positions, 1.0);
+        let cloud = CloudView {
+            positions: &positions,
+            sizes: Sizes::Same(1.0),
+            values: &[],
+            dimension: 3,
+        };
+        let sight = Sight::new(view);
+        let mut plain = Depths::new(&screen);
+        let cube = Cube::new(&sight);
+        for splat in from_front_to_back(&sight, &screen, &cloud).iter().flatten() {
+            plain.draw(splat, &cube); // blocks are never closed: nothing is skipped
+        }
+        assert_eq!(fast.depth, plain.depth);
+        assert_eq!(fast.shown, plain.shown);
+    }
+
+    #[test]
+    fn the_nearer_point_hides_the_farther_one_whatever_their_order() {
+        let view = View {
+            azimuth: 0.0,
+            elevation: 0.0,
+        };
+        for positions in [[[0.0; 3], [5.0, 0.0, 0.0]], [[5.0, 0.0, 0.0], [0.0; 3]]] {
+            let (depths, _) = canvas(view, &positions, 1.0);
+            let middle = depths.shown[100 * 200 + 100].0 as usize;
+            assert_eq!(positions[middle][0], 5.0);
+        }
+    }
+
+    #[test]
+    fn faces_are_told_apart_by_light_and_pictures_repeat_exactly() {
+        let positions = block(12);
+        let values = vec![0.0; positions.len()];
+        let cloud = CloudView {
+            positions: &positions,
+            sizes: Sizes::Same(1.0),
+            values: &values,
+            dimension: 3,
+        };
+        let picture = Picture {
+            width: 400,
+            range: Some((0.0, 1.0)),
+            ..Picture::default()
+        };
+        let image = draw(&picture, &cloud, None);
+        assert_eq!(image, draw(&picture, &cloud, None));
+        let mut counts = std::collections::HashMap::new();
+        for pixel in &image.pixels {
+            *counts.entry(*pixel).or_insert(0_usize) += 1;
+        }
+        counts.remove(&WHITE);
+        let mut faces: Vec<u8> = counts
+            .into_iter()
+            .filter(|(_, count)| *count > 1000)
+            .map(|(color, _)| color[2])
+            .collect();
+        faces.sort_unstable();
+        // Rounding may give one face two shades.
+        faces.dedup_by(|a, b| a.abs_diff(*b) <= 2);
+        assert_eq!(faces.len(), 3, "{faces:?}");
+    }
+}

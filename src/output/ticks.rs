@@ -38,7 +38,12 @@ impl Axis {
         if self.logarithmic {
             logarithmic_ticks(self.low, self.high, count)
         } else {
-            linear_ticks(self.low, self.high, count, factor)
+            // One label alone does not tell the scale.
+            [count, 2 * count, 4 * count]
+                .map(|count| linear_ticks(self.low, self.high, count, factor))
+                .into_iter()
+                .find(|ticks| ticks.labels.len() > 1)
+                .unwrap_or_default()
         }
     }
 }
@@ -81,8 +86,8 @@ fn linear_ticks(low: f64, high: f64, count: usize, factor: f64) -> Ticks {
     let tolerance = 1e-9; // of a step, for ends that are ticks but for rounding
     let first = (low / step - tolerance).ceil();
     let last = (high / step + tolerance).floor();
-    // Also false if a number is not one.
-    if !(last - first <= 4.0 * count as f64 + 4.0) {
+    let number = last - first;
+    if number.is_nan() || number > 4.0 * count as f64 + 4.0 {
         return Ticks::default();
     }
     let steps = (last - first).max(-1.0) as i64;
@@ -92,9 +97,12 @@ fn linear_ticks(low: f64, high: f64, count: usize, factor: f64) -> Ticks {
     let digits = (more - power).clamp(0.0, 15.0) as usize;
     let largest = low.abs().max(high.abs());
     let label = |value: f64| {
-        if largest >= 1e7 || largest < 1e-6 {
+        if !(1e-6..1e7).contains(&largest) {
             let decimals = (largest.log10().floor() - power + more).clamp(0.0, 15.0);
-            powers_written(&format!("{value:.*e}", decimals as usize))
+            // Rounded, then written without the zeros at the end.
+            let rounded = format!("{value:.*e}", decimals as usize);
+            let rounded: f64 = rounded.parse().unwrap_or(value);
+            powers_written(&format!("{rounded:e}"))
         } else {
             minus_written(&format!("{value:.digits$}"))
         }
@@ -123,7 +131,14 @@ pub(super) fn round_step(step: f64) -> f64 {
 
 /// Powers of ten, thinned out if there are many; 1, 2, 5 if there are few; round steps if still fewer.
 fn logarithmic_ticks(low: f64, high: f64, count: usize) -> Ticks {
-    let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
+    if low.is_nan() || low <= 0.0 {
+        return Ticks::default();
+    }
+    // All powers that f64 has lie within; the bounds only keep a wrong range from looping.
+    let (first, last) = (
+        low.log10().floor().max(-330.0) as i32,
+        high.log10().ceil().min(310.0) as i32,
+    );
     let tolerance = 1e-9;
     let inside = |value: &f64| (low * (1.0 - tolerance)..=high * (1.0 + tolerance)).contains(value);
     let at = |digits: &[i32], every: i32| -> Vec<f64> {
@@ -338,7 +353,7 @@ mod tests {
                     assert!(axis.ticks(6, 1.0).labels.len() < 40, "{axis:?}");
                 }
                 let [low, high] = widened([low.min(high), high.max(low)]);
-                assert!(!(low >= high), "{low} {high}");
+                assert!(low < high || low.is_nan(), "{low} {high}");
             }
         }
     }
@@ -360,7 +375,7 @@ mod tests {
         assert_eq!(words(&ticks(0.09, 1.1)), ["0.1", "0.2", "0.5", "1"]);
         assert_eq!(words(&ticks(1e-20, 1.0)).len(), 6);
         assert!(ticks(1.11, 1.29).labels.len() >= 2);
-        assert_eq!(ticks(1.0, 100.0).minor.len(), 14);
+        assert_eq!(ticks(1.0, 100.0).minor.len(), 16);
     }
 
     #[test]

@@ -1,2 +1,99 @@
-//! Proof: closed forms, published figures and studies that compare the program with them.
+//! Proof: studies that compare the program with closed forms and published figures, each in one file.
+//!
+//! A study prints what is published or exact beside what was obtained, the difference, the tolerance and where the
+//! tolerance comes from, and plots itself. `bondwise verify` runs them; tests assert that they pass.
+
 pub mod discrete;
+
+use serde::Serialize;
+
+use crate::error::Result;
+use crate::output::picture::Image;
+
+/// A verification study.
+#[derive(Clone, Copy)]
+pub struct Study {
+    /// As on the command line, `crack-branching`.
+    pub name: &'static str,
+    /// What it shows, in one line.
+    pub about: &'static str,
+    /// Takes more than about a minute on two cores: run by name or with `--full` only.
+    pub heavy: bool,
+    /// `full`: the whole extent of the study rather than its quick form.
+    pub run: fn(full: bool) -> Result<Outcome>,
+}
+
+/// All studies, in reading order.
+pub const STUDIES: &[Study] = &[];
+
+/// What a study found.
+#[derive(Debug, Clone, Default)]
+pub struct Outcome {
+    pub rows: Vec<Row>,
+    /// File name without extension, and the picture.
+    pub plots: Vec<(String, Image)>,
+    /// Remarks for the reader: what a figure means, what cannot be reproduced and why.
+    pub notes: Vec<String>,
+}
+
+/// One comparison.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// What is compared, with its unit.
+    pub what: String,
+    /// Published or exact value.
+    pub expected: f64,
+    pub obtained: f64,
+    pub tolerance: f64,
+    pub measure: Measure,
+    /// Where the expected value comes from, and why the tolerance is what it is.
+    pub origin: String,
+}
+
+/// How obtained and expected are compared with the tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Measure {
+    /// |obtained − expected| ≤ tolerance
+    Absolute,
+    /// |obtained − expected| ≤ tolerance |expected|
+    Relative,
+    /// obtained ≤ expected (tolerance unused)
+    AtMost,
+    /// obtained ≥ expected (tolerance unused)
+    AtLeast,
+}
+
+impl Row {
+    pub fn new(
+        what: impl Into<String>,
+        expected: f64,
+        obtained: f64,
+        tolerance: f64,
+        measure: Measure,
+        origin: impl Into<String>,
+    ) -> Self {
+        Row { what: what.into(), expected, obtained, tolerance, measure, origin: origin.into() }
+    }
+
+    /// Obtained less expected, divided by |expected| where the comparison is relative.
+    pub fn difference(&self) -> f64 {
+        let difference = self.obtained - self.expected;
+        if self.measure == Measure::Relative { difference / self.expected.abs() } else { difference }
+    }
+
+    /// Not-a-number never passes.
+    pub fn passes(&self) -> bool {
+        match self.measure {
+            Measure::Absolute | Measure::Relative => self.difference().abs() <= self.tolerance,
+            Measure::AtMost => self.obtained <= self.expected,
+            Measure::AtLeast => self.obtained >= self.expected,
+        }
+    }
+}
+
+impl Outcome {
+    pub fn passes(&self) -> bool {
+        self.rows.iter().all(Row::passes)
+    }
+}

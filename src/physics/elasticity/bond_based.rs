@@ -42,10 +42,6 @@ impl<const D: usize> BondLaw<D> for BondBased {
     fn tangent(&self, length: f64, weight: f64) -> f64 {
         weight / length
     }
-
-    fn energy_at(&self, length: f64, weight: f64, stretch: f64) -> f64 {
-        0.5 * weight * stretch * stretch * length
-    }
 }
 
 impl<const D: usize> BondLaw<D> for BondBasedLinear {
@@ -64,10 +60,6 @@ impl<const D: usize> BondLaw<D> for BondBasedLinear {
 
     fn tangent(&self, length: f64, weight: f64) -> f64 {
         weight / length
-    }
-
-    fn energy_at(&self, length: f64, weight: f64, stretch: f64) -> f64 {
-        0.5 * weight * stretch * stretch * length
     }
 }
 

@@ -8,7 +8,7 @@ pub mod moduli;
 use crate::discretization::{BondWeights, Operator};
 use crate::execution::{BreakRule, Broken, Exec};
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
-use crate::field::{components, components_mut, difference, norm};
+use crate::field::{components, components_mut, difference, dot, norm};
 use crate::geometry::Arrangement;
 use crate::lane::Lane;
 use crate::physics::failure::CriticalStretch;
@@ -53,13 +53,22 @@ impl<L> Elasticity<L> {
     }
 
     /// Breaks the bonds that the displacements overstretch, then fills `state.force` with the internal force density.
-    pub fn evaluate<const D: usize>(&self, body: &Body<D>, exec: &mut Exec, state: &mut State)
+    ///
+    /// `dt`: the step that led to these displacements with the velocities as they are now, for the books of the
+    /// energy that broken bonds take; zero at the start.
+    pub fn evaluate<const D: usize>(&self, body: &Body<D>, exec: &mut Exec, state: &mut State, dt: f64)
     where
         L: BondLaw<D>,
     {
         let kernel = Force(self.law);
         let (input, output) = (components::<D>(&state.displacement), components_mut::<D>(&mut state.force));
-        let rule = Breaking::<D, L> { failure: self.failure.as_ref(), law: self.law };
+        let rule = Breaking::<D, L> {
+            failure: self.failure.as_ref(),
+            law: self.law,
+            displacement: input,
+            velocity: components::<D>(&state.velocity),
+            dt,
+        };
         let weights = &self.operator.weights;
         let now = exec.sum_bonds_and_break(body, weights, &mut state.states, input, output, &kernel, &rule);
         state.broken.bonds += now.bonds;
@@ -159,20 +168,33 @@ impl<const D: usize> BondKernel<D, 0, 1> for Weight {
     }
 }
 
-/// The critical stretch, if bonds can break, together with the law that knows what a broken bond held.
+/// The critical stretch, if bonds can break, and what is needed to know the energy that a broken bond takes.
 struct Breaking<'a, const D: usize, L: BondLaw<D>> {
     failure: Option<&'a CriticalStretch>,
     law: L,
+    displacement: [&'a [f64]; D],
+    velocity: [&'a [f64]; D],
+    dt: f64,
 }
 
-impl<const D: usize, L: BondLaw<D>> BreakRule for Breaking<'_, D, L> {
+impl<const D: usize, L: BondLaw<D>> BreakRule<D> for Breaking<'_, D, L> {
     fn threshold(&self) -> f64 {
         self.failure.map_or(f64::INFINITY, CriticalStretch::smallest)
     }
+
     fn breaks(&self, here: usize, there: usize, stretch: f64) -> bool {
         self.failure.is_some_and(|failure| stretch > failure.of(here, there))
     }
-    fn released(&self, weight: f64, length: f64, stretch: f64) -> f64 {
-        0.5 * self.law.energy_at(length, weight, stretch)
+
+    /// Half of w(η) + ½ f(η)·Δη, with η at the start of the step in which the bond breaks and Δη its change in the
+    /// step: what the bond held, and what it still took from the motion, since velocity Verlet kicks with its force at
+    /// the start of the step and no longer with that at the end. So the books balance whatever the step.
+    fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
+        let change: [f64; D] =
+            std::array::from_fn(|d| self.dt * (self.velocity[d][there] - self.velocity[d][here]));
+        let before: [f64; D] =
+            std::array::from_fn(|d| self.displacement[d][there] - self.displacement[d][here] - change[d]);
+        let (force, _) = self.law.force(bond, before);
+        0.5 * (self.law.energy(bond, before) + 0.5 * dot(&force, &change))
     }
 }
