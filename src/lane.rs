@@ -43,15 +43,6 @@ impl Pack {
         Pack(*source)
     }
 
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let mut out = self;
-        for k in 0..LANES {
-            out.0[k] = f(self.0[k], other.0[k]);
-        }
-        out
-    }
-
     /// Keeps the lanes whose bit is set, zeroes the others.
     #[inline(always)]
     pub fn keep(self, mask: u8) -> Self {
@@ -101,29 +92,41 @@ static KEEP: [[u64; LANES]; 256] = {
 impl Add for Pack {
     type Output = Self;
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
+    fn add(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] += other.0[k];
+        }
+        self
     }
 }
 impl Sub for Pack {
     type Output = Self;
     #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
+    fn sub(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] -= other.0[k];
+        }
+        self
     }
 }
 impl Mul for Pack {
     type Output = Self;
     #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
+    fn mul(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] *= other.0[k];
+        }
+        self
     }
 }
 impl Div for Pack {
     type Output = Self;
     #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        self.zip(other, |a, b| a / b)
+    fn div(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] /= other.0[k];
+        }
+        self
     }
 }
 
@@ -141,8 +144,11 @@ impl Lane for Pack {
         out
     }
     #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| if b > a { b } else { a })
+    fn max(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] = Lane::max(self.0[k], other.0[k]);
+        }
+        self
     }
 }
 

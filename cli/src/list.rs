@@ -1,5 +1,110 @@
-//! `bondwise list`
+//! `bondwise list`: what there is, from the same types and tables that the rest of the program uses.
+
 use std::process::ExitCode;
+
 use bondwise::Result;
-pub const TOPICS: [&str; 1] = ["cases"];
-pub fn list(_: Option<&str>) -> Result<ExitCode> { Ok(ExitCode::SUCCESS) }
+use bondwise::case::{Case, bundled, schema_of};
+use bondwise::verify::STUDIES;
+use serde_json::Value;
+
+use crate::bench::PROBLEMS;
+use crate::say;
+
+/// What can be listed.
+pub const TOPICS: [&str; 16] = [
+    "cases",
+    "shapes",
+    "regions",
+    "cracks",
+    "laws",
+    "failures",
+    "influence",
+    "volumes",
+    "schemes",
+    "conditions",
+    "solvers",
+    "outputs",
+    "fields",
+    "studies",
+    "problems",
+    "schema",
+];
+
+/// Topic, and the name of its type in the schema.
+const TYPES: [(&str, &str); 12] = [
+    ("shapes", "Shape"),
+    ("regions", "Region"),
+    ("cracks", "Crack"),
+    ("laws", "Law"),
+    ("failures", "Failure"),
+    ("influence", "InfluenceFunction"),
+    ("volumes", "PartialVolumes"),
+    ("schemes", "Scheme"),
+    ("conditions", "Condition"),
+    ("solvers", "Solver"),
+    ("outputs", "Output"),
+    ("fields", "FieldName"),
+];
+
+pub fn list(topic: Option<&str>) -> Result<ExitCode> {
+    if topic == Some("schema") {
+        say!("{:#}", schema_of::<Case>());
+        return Ok(ExitCode::SUCCESS);
+    }
+    let schema = schema_of::<Case>();
+    for name in TOPICS {
+        if topic.is_some_and(|t| t != name) || name == "schema" {
+            continue;
+        }
+        if topic.is_none() {
+            say!("{name}:");
+        }
+        for (item, about) in items(name, &schema) {
+            say!("  {item:<24} {about}");
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn items(topic: &str, schema: &Value) -> Vec<(String, String)> {
+    let plain = |pair: (&str, &str)| (pair.0.to_string(), pair.1.to_string());
+    match topic {
+        "cases" => bundled::CASES.iter().map(|c| plain((c.name, c.about))).collect(),
+        "studies" => STUDIES.iter().map(|s| plain((s.name, s.about))).collect(),
+        "problems" => PROBLEMS.iter().copied().map(plain).collect(),
+        "conditions" => {
+            let mut all = Vec::new();
+            for (key, name) in [("initial", "Motion"), ("prescribe", "Motion"), ("load", "Load")] {
+                for (item, about) in variants(&schema["$defs"][name]) {
+                    all.push((format!("{key}.{item}"), about));
+                }
+            }
+            all
+        }
+        _ => TYPES.iter().find(|(t, _)| *t == topic).map_or(Vec::new(), |(_, name)| variants(&schema["$defs"][name])),
+    }
+}
+
+/// Names and first lines of documentation of the variants of an enum in the schema.
+fn variants(schema: &Value) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    let about = |node: &Value| {
+        let text = node["description"].as_str().unwrap_or_default();
+        text.split('\n').take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
+    };
+    for variant in ["oneOf", "anyOf"].iter().filter_map(|k| schema[*k].as_array()).flatten() {
+        if let Some(name) = variant["const"].as_str() {
+            found.push((name.to_string(), about(variant)));
+        }
+        for name in variant["enum"].as_array().into_iter().flatten().filter_map(Value::as_str) {
+            found.push((name.to_string(), about(variant)));
+        }
+        for name in variant["properties"].as_object().into_iter().flat_map(|p| p.keys()) {
+            found.push((name.clone(), about(variant)));
+        }
+    }
+    for name in schema["enum"].as_array().into_iter().flatten().filter_map(Value::as_str) {
+        found.push((name.to_string(), String::new()));
+    }
+    found
+}

@@ -16,9 +16,11 @@ use clap::{Args, Parser, Subcommand};
 /// Peridynamics: cracks that start, run and branch, from one case file.
 #[derive(Parser)]
 #[command(name = "bondwise", version, arg_required_else_help = true, propagate_version = true)]
-#[command(after_help = "Exit codes: 0 done, 1 a verification failed, 2 usage, 3 input refused, 4 stopped on numbers,\n\
+#[command(
+    after_help = "Exit codes: 0 done, 1 a verification failed, 2 usage, 3 input refused, 4 stopped on numbers,\n\
     5 I/O, 6 too large for this machine, 7 no usable checkpoint, 130 interrupted.\n\n\
-    Example:\n  bondwise new crack_branching\n  bondwise run crack_branching")]
+    Example:\n  bondwise new crack_branching\n  bondwise run crack_branching"
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -27,7 +29,9 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Run a case: march it to its end, write frames, pictures, history and report.
-    #[command(after_help = "Example:\n  bondwise run cases/crack_branching --out results --set geometry.spacing=\"0.5 mm\"")]
+    #[command(
+        after_help = "Example:\n  bondwise run cases/crack_branching --out results --set geometry.spacing=\"0.5 mm\""
+    )]
     Run(RunArgs),
     /// Say what a case would do: points, bonds, neighbours, steps, memory. Changes nothing.
     #[command(after_help = "Example:\n  bondwise check cases/crack_branching")]

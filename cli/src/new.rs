@@ -12,8 +12,12 @@ use crate::say;
 pub fn new(name: &str, folder: Option<PathBuf>) -> Result<ExitCode> {
     let Some(case) = bundled::CASES.iter().find(|c| c.name == name) else {
         let names: Vec<&str> = bundled::CASES.iter().map(|c| c.name).collect();
-        let help = nearest(name, names.iter().copied()).map_or(String::new(), |n| format!("\n    help: did you mean `{n}`?"));
-        return Err(Error::Refused(format!("no bundled case is called `{name}`; there are {}{help}", names.join(", "))));
+        let help =
+            nearest(name, names.iter().copied()).map_or(String::new(), |n| format!("\n    help: did you mean `{n}`?"));
+        return Err(Error::Refused(format!(
+            "no bundled case is called `{name}`; there are {}{help}",
+            names.join(", ")
+        )));
     };
     let folder = folder.unwrap_or_else(|| PathBuf::from(name));
     if folder.exists() {

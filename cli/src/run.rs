@@ -5,10 +5,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use bondwise::Result;
 use bondwise::case::build::{Options, load};
 use bondwise::output::report::Report;
 use bondwise::simulation::{Wish, prepare_folder};
-use bondwise::Result;
 
 use crate::progress::Line;
 use crate::{RunArgs, on_threads, say};
@@ -83,9 +83,10 @@ fn summary(report: &Report, folder: &Path) {
     );
     say!("broken bonds: {}; damaged points: {}", report.broken_bonds, report.damaged_points);
     if let Some(tip) = &report.crack_tip {
-        let place = tip.position.as_ref().map_or("none".into(), |x| {
-            x.iter().map(|x| format!("{:.3}", 1e3 * x)).collect::<Vec<_>>().join(", ")
-        });
+        let place = tip
+            .position
+            .as_ref()
+            .map_or("none".into(), |x| x.iter().map(|x| format!("{:.3}", 1e3 * x)).collect::<Vec<_>>().join(", "));
         say!(
             "crack tip: ({place}) mm; largest speed {:.0} m/s (Rayleigh speed {:.0} m/s)",
             tip.largest_speed,

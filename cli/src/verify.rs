@@ -1,6 +1,8 @@
 //! `bondwise verify`
-use std::process::ExitCode;
 use bondwise::Result;
+use std::process::ExitCode;
 #[derive(clap::Args)]
 pub struct VerifyArgs {}
-pub fn verify(_: &VerifyArgs) -> Result<ExitCode> { Ok(ExitCode::SUCCESS) }
+pub fn verify(_: &VerifyArgs) -> Result<ExitCode> {
+    Ok(ExitCode::SUCCESS)
+}

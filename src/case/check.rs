@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::diagnostics::Diagnostic;
 use super::model::{
-    BondBased, Case, CriticalStretch, Crack, FailurePair, Law, Load, Motion, Output, Plane, Region, Shape, Solver,
+    BondBased, Case, Crack, CriticalStretch, FailurePair, Law, Load, Motion, Output, Plane, Region, Shape, Solver,
 };
 use super::read::{Located, Source};
 use crate::expression::nearest;
@@ -35,7 +35,11 @@ impl Checker<'_> {
     fn either(&mut self, path: &str, a: (&str, bool), b: (&str, bool)) {
         match (a.1, b.1) {
             (true, true) => {
-                self.error(path, format!("`{}` and `{}` are both given; only one may be", a.0, b.0), "remove one of them");
+                self.error(
+                    path,
+                    format!("`{}` and `{}` are both given; only one may be", a.0, b.0),
+                    "remove one of them",
+                );
             }
             (false, false) => {
                 self.error(path, format!("neither `{}` nor `{}` is given; one must be", a.0, b.0), "");
@@ -119,12 +123,20 @@ impl Checker<'_> {
         self.either("geometry", ("shape", geometry.shape.is_some()), ("points", geometry.points.is_some()));
         if let Some(shape) = &geometry.shape {
             if geometry.spacing.is_none() {
-                self.error("geometry", "`spacing` is missing: a shape is filled with cells of this side", "add `spacing = <number, m>`");
+                self.error(
+                    "geometry",
+                    "`spacing` is missing: a shape is filled with cells of this side",
+                    "add `spacing = <number, m>`",
+                );
             }
             self.shape(shape, dimension, "geometry.shape");
         } else {
             if geometry.spacing.is_some() {
-                self.error("geometry.spacing", "`spacing` belongs to `shape`; points from a file have volumes instead", "remove it");
+                self.error(
+                    "geometry.spacing",
+                    "`spacing` belongs to `shape`; points from a file have volumes instead",
+                    "remove it",
+                );
             }
             if geometry.perturb.is_some() {
                 self.error("geometry.perturb", "only the lattice of a `shape` can be perturbed", "remove it");
@@ -166,7 +178,11 @@ impl Checker<'_> {
 
     fn component(&mut self, component: usize, dimension: usize, path: &str) {
         if component >= dimension {
-            self.error(path, format!("component {component} does not exist in {dimension}D; 0 to {} do", dimension - 1), "");
+            self.error(
+                path,
+                format!("component {component} does not exist in {dimension}D; 0 to {} do", dimension - 1),
+                "",
+            );
         }
     }
 
@@ -249,7 +265,11 @@ impl Checker<'_> {
 
     fn law(&mut self, law: &BondBased, dimension: usize, path: &str) {
         if law.plane.is_some() && dimension != 2 {
-            self.error(&format!("{path}.plane"), format!("`plane` is for 2D, and this case is {dimension}D"), "remove it");
+            self.error(
+                &format!("{path}.plane"),
+                format!("`plane` is for 2D, and this case is {dimension}D"),
+                "remove it",
+            );
         }
         if let Some(poisson) = law.poisson {
             let (fixed, name, why) = match (dimension, law.plane) {
@@ -261,7 +281,9 @@ impl Checker<'_> {
             // 1e-3 lets 0.333 stand for 1/3.
             if fixed.is_none_or(|fixed| (poisson - fixed).abs() > 1e-3) {
                 let message = match fixed {
-                    Some(_) => format!("found {poisson}, but the bond-based law fixes the Poisson ratio at {name} {why}"),
+                    Some(_) => {
+                        format!("found {poisson}, but the bond-based law fixes the Poisson ratio at {name} {why}")
+                    }
                     None => format!("found {poisson}, but {why}"),
                 };
                 self.error(&format!("{path}.poisson"), message, "remove the key, or give that value");
@@ -269,7 +291,13 @@ impl Checker<'_> {
         }
     }
 
-    fn failure<'a>(&mut self, failure: &'a CriticalStretch, case: &'a Case, imported: bool, used: &mut BTreeSet<&'a str>) {
+    fn failure<'a>(
+        &mut self,
+        failure: &'a CriticalStretch,
+        case: &'a Case,
+        imported: bool,
+        used: &mut BTreeSet<&'a str>,
+    ) {
         let path = "physics.elasticity.failure.critical_stretch";
         self.either(
             path,
@@ -289,7 +317,14 @@ impl Checker<'_> {
     }
 
     /// Sets of imported points are known only when the file is read: `build` asks for them.
-    fn set_name<'a>(&mut self, name: &'a str, case: &'a Case, imported: bool, path: &str, used: &mut BTreeSet<&'a str>) {
+    fn set_name<'a>(
+        &mut self,
+        name: &'a str,
+        case: &'a Case,
+        imported: bool,
+        path: &str,
+        used: &mut BTreeSet<&'a str>,
+    ) {
         used.insert(name);
         if name == "all" || case.sets.contains_key(name) || imported {
             return;

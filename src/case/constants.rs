@@ -22,9 +22,9 @@ const MOST_CONSTANTS: usize = 1000;
 
 /// Names that mean something in every expression.
 const RESERVED: [&str; 34] = [
-    "x", "y", "z", "t", "pi", "and", "or", "not", "sin", "cos", "tan", "asin", "acos", "atan",
-    "atan2", "sinh", "cosh", "tanh", "exp", "log", "log10", "sqrt", "abs", "sign", "floor", "ceil",
-    "min", "max", "pow", "hypot", "step", "if", "clamp", "erf",
+    "x", "y", "z", "t", "pi", "and", "or", "not", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh",
+    "tanh", "exp", "log", "log10", "sqrt", "abs", "sign", "floor", "ceil", "min", "max", "pow", "hypot", "step", "if",
+    "clamp", "erf",
 ];
 
 /// The constants of a case that could be computed, and the names of those that could not.
@@ -58,12 +58,7 @@ impl Constants {
     }
 
     /// The SI number behind a number with a unit; `None` if the text is not of that form.
-    pub fn quantity(
-        &self,
-        text: &str,
-        wanted: Option<Dimension>,
-        variables: &[&str],
-    ) -> Option<Result<f64, Mistake>> {
+    pub fn quantity(&self, text: &str, wanted: Option<Dimension>, variables: &[&str]) -> Option<Result<f64, Mistake>> {
         let (number, unit_text) = split_quantity(text)?;
         // `2t` is a product with its sign forgotten, and is explained as such.
         let word = names(unit_text).next().unwrap_or("");
@@ -74,16 +69,10 @@ impl Constants {
         }
         let value = parsed.map_err(Mistake::Unit).and_then(|unit| {
             if wanted.is_some_and(|wanted| wanted != unit.dimension) {
-                return Err(Mistake::Dimension {
-                    found: unit.dimension,
-                });
+                return Err(Mistake::Dimension { found: unit.dimension });
             }
-            unit.to_si(number).ok_or_else(|| {
-                Mistake::Unit(UnitError {
-                    message: "the number cannot be read".to_owned(),
-                    help: None,
-                })
-            })
+            unit.to_si(number)
+                .ok_or_else(|| Mistake::Unit(UnitError { message: "the number cannot be read".to_owned(), help: None }))
         });
         Some(value)
     }
@@ -91,11 +80,7 @@ impl Constants {
     /// Compiles a formula of the given variables.
     pub fn compile(&self, text: &str, variables: &[&str]) -> Result<Expression, Mistake> {
         Expression::compile(text, variables, &self.known).map_err(|error| {
-            if names(text).any(|name| self.failed.contains(name)) {
-                Mistake::Echo
-            } else {
-                Mistake::Expression(error)
-            }
+            if names(text).any(|name| self.failed.contains(name)) { Mistake::Echo } else { Mistake::Expression(error) }
         })
     }
 
@@ -210,9 +195,7 @@ impl<'a> Evaluation<'a> {
         }
         if RESERVED.contains(&name) {
             let message = format!("`{name}` means something else in every expression");
-            self.report(&entry.key_origin, name, message, |d| {
-                d.help("choose another name")
-            });
+            self.report(&entry.key_origin, name, message, |d| d.help("choose another name"));
             return None;
         }
         let value = match &entry.node.value {
@@ -223,13 +206,7 @@ impl<'a> Evaluation<'a> {
                 Err(mistake) => {
                     let path = join("constants", name);
                     let found = self.source.found(&entry.node);
-                    self.diagnostics.extend(mistake.diagnostic(
-                        self.source,
-                        &entry.node,
-                        &path,
-                        found,
-                        None,
-                    ));
+                    self.diagnostics.extend(mistake.diagnostic(self.source, &entry.node, &path, found, None));
                     return None;
                 }
             },
@@ -244,26 +221,14 @@ impl<'a> Evaluation<'a> {
             }
             None => {
                 let message = "must be a number, a number with a unit or an expression";
-                self.report(&entry.node.origin, name, message.to_owned(), |d| {
-                    d.found(found)
-                });
+                self.report(&entry.node.origin, name, message.to_owned(), |d| d.found(found));
             }
         }
         None
     }
 
-    fn report(
-        &mut self,
-        origin: &Origin,
-        name: &str,
-        message: String,
-        more: impl FnOnce(Diagnostic) -> Diagnostic,
-    ) {
-        let path = if name.is_empty() {
-            "constants".to_owned()
-        } else {
-            join("constants", name)
-        };
+    fn report(&mut self, origin: &Origin, name: &str, message: String, more: impl FnOnce(Diagnostic) -> Diagnostic) {
+        let path = if name.is_empty() { "constants".to_owned() } else { join("constants", name) };
         let place = self.source.place_of(origin);
         let diagnostic = Diagnostic::error(place, &path, message);
         self.diagnostics.push(more(diagnostic));
@@ -284,20 +249,14 @@ impl Mistake {
         let allowed = wanted.map(|(_, allowed)| allowed.to_owned());
         let mut diagnostic = match self {
             Self::Echo => return None,
-            Self::Unit(error) => Diagnostic {
-                help: error.help,
-                allowed,
-                ..Diagnostic::error(place, path, error.message)
-            },
+            Self::Unit(error) => {
+                Diagnostic { help: error.help, allowed, ..Diagnostic::error(place, path, error.message) }
+            }
             Self::Dimension { found } => {
-                let wanted = wanted.map_or_else(String::new, |(wanted, _)| {
-                    format!(" where {} is wanted", wanted.name())
-                });
+                let wanted =
+                    wanted.map_or_else(String::new, |(wanted, _)| format!(" where {} is wanted", wanted.name()));
                 let message = format!("this is {}{wanted}", found.name());
-                Diagnostic {
-                    allowed,
-                    ..Diagnostic::error(place, path, message)
-                }
+                Diagnostic { allowed, ..Diagnostic::error(place, path, message) }
             }
             Self::Expression(error) => {
                 let NodeValue::Text(text) = &node.value else {
@@ -322,15 +281,11 @@ impl Mistake {
 /// The names in an expression; `e5` of `1e5` is not one.
 fn names(text: &str) -> impl Iterator<Item = &str> {
     let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
-    text.split(move |c| !is_part(c))
-        .filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_'))
+    text.split(move |c| !is_part(c)).filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_'))
 }
 
 /// The nearest of some names to a misspelt one, if it is near.
-pub(super) fn did_you_mean<'a>(
-    name: &str,
-    names: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub(super) fn did_you_mean<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // The cost grows with the square of the length; no key is this long.
     if name.len() > 64 {
         return None;

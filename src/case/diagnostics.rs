@@ -40,11 +40,7 @@ pub enum Severity {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// A character of the case file; line and column count from one, columns in characters.
-    Text {
-        file: String,
-        line: usize,
-        column: usize,
-    },
+    Text { file: String, line: usize, column: usize },
     /// The file as a whole.
     File { file: String },
     /// A value given on the command line, as in `--set mesh.spacing=2`.
@@ -67,10 +63,7 @@ impl Diagnostic {
 
     /// A warning with nothing but its place, key and message.
     pub fn warning(place: Place, path: &str, message: impl Into<String>) -> Self {
-        Self {
-            severity: Severity::Warning,
-            ..Self::error(place, path, message)
-        }
+        Self { severity: Severity::Warning, ..Self::error(place, path, message) }
     }
 
     /// Adds the value as it was written.

@@ -71,10 +71,7 @@ pub fn read_file<T: DeserializeOwned + JsonSchema>(
     let name = path.display().to_string();
     let refuse = |place: Place, message: String| {
         let list = vec![Diagnostic::error(place, "", message)];
-        Diagnostics {
-            file: name.clone(),
-            list,
-        }
+        Diagnostics { file: name.clone(), list }
     };
     let whole = || Place::File { file: name.clone() };
     let cannot = |e: std::io::Error| refuse(whole(), format!("cannot be read: {e}"));
@@ -86,9 +83,7 @@ pub fn read_file<T: DeserializeOwned + JsonSchema>(
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(cannot)?;
     // The length can be wrong or grow; the reader is held to the limit as well.
-    file.take(LARGEST + 1)
-        .read_to_end(&mut bytes)
-        .map_err(cannot)?;
+    file.take(LARGEST + 1).read_to_end(&mut bytes).map_err(cannot)?;
     if bytes.len() as u64 > LARGEST {
         let message = format!("is larger than {} MiB", LARGEST >> 20);
         return Err(refuse(whole(), message));
@@ -99,11 +94,7 @@ pub fn read_file<T: DeserializeOwned + JsonSchema>(
             let offset = error.utf8_error().valid_up_to();
             let before = String::from_utf8_lossy(&error.as_bytes()[..offset]).into_owned();
             let (line, column) = Source::new(&name, &before, &[]).position(before.len());
-            let place = Place::Text {
-                file: name.clone(),
-                line,
-                column,
-            };
+            let place = Place::Text { file: name.clone(), line, column };
             let byte = error.as_bytes()[offset];
             let message = format!("byte 0x{byte:02X} at offset {offset} is not UTF-8");
             Err(refuse(place, message))
@@ -120,9 +111,7 @@ pub fn read_text<T: DeserializeOwned + JsonSchema>(
     let mut source = Source::new(name, text, overrides);
     if text.len() as u64 > LARGEST {
         let message = format!("is larger than {} MiB", LARGEST >> 20);
-        let place = Place::File {
-            file: name.to_owned(),
-        };
+        let place = Place::File { file: name.to_owned() };
         return Err(source.refuse(vec![Diagnostic::error(place, "", message)]));
     }
     let (mut root, mut mistakes, readable) = tree::parse(&source);
@@ -145,16 +134,10 @@ pub fn read_text<T: DeserializeOwned + JsonSchema>(
         return Err(source.refuse(mistakes));
     }
     match serde_json::from_value(value) {
-        Ok(value) => Ok(Located {
-            value,
-            source,
-            constants: constants.known,
-        }),
+        Ok(value) => Ok(Located { value, source, constants: constants.known }),
         // The types ask for more than their schema says.
         Err(error) => {
-            let place = Place::File {
-                file: name.to_owned(),
-            };
+            let place = Place::File { file: name.to_owned() };
             Err(source.refuse(vec![Diagnostic::error(place, "", error.to_string())]))
         }
     }
@@ -189,9 +172,7 @@ fn allow_texts(schema: &mut Value) {
         Some(Value::String(name)) if name == "number" => {
             map.insert("type".to_owned(), json!(["number", "string"]));
         }
-        Some(Value::Array(names))
-            if names.contains(&json!("number")) && !names.contains(&json!("string")) =>
-        {
+        Some(Value::Array(names)) if names.contains(&json!("number")) && !names.contains(&json!("string")) => {
             names.push(json!("string"));
         }
         _ => {}
@@ -224,9 +205,7 @@ fn take_constants(root: &mut Node, source: &Source) -> (Constants, Vec<Diagnosti
 /// The remark about an empty case. The root type may carry its smallest case as the extension
 /// `x-smallest`; the tables that are needed are listed otherwise.
 fn nothing_to_run(name: &str, schema: &Value) -> Diagnostic {
-    let place = Place::File {
-        file: name.to_owned(),
-    };
+    let place = Place::File { file: name.to_owned() };
     let diagnostic = Diagnostic::error(place, "", "nothing to run: the case is empty");
     if let Some(text) = schema.get("x-smallest").and_then(Value::as_str) {
         return diagnostic.help(format!("the smallest case is\n{}", text.trim_end()));
@@ -245,13 +224,7 @@ impl Source {
         let text = text.strip_prefix('\u{FEFF}').unwrap_or(text).to_owned();
         let breaks = text.match_indices('\n').map(|(index, _)| index + 1);
         let line_starts = std::iter::once(0).chain(breaks).collect();
-        Self {
-            name: name.to_owned(),
-            text,
-            overrides: overrides.to_vec(),
-            line_starts,
-            spots: HashMap::new(),
-        }
+        Self { name: name.to_owned(), text, overrides: overrides.to_vec(), line_starts, spots: HashMap::new() }
     }
 
     /// The place of the value at a key path such as `conditions[1].value`, or of the nearest
@@ -265,9 +238,7 @@ impl Source {
             match path.rfind(['.', '[']) {
                 Some(end) => path = &path[..end],
                 None => {
-                    return Place::File {
-                        file: self.name.clone(),
-                    };
+                    return Place::File { file: self.name.clone() };
                 }
             }
         }
@@ -287,10 +258,7 @@ impl Source {
 
     /// As [`Source::error`], but a warning.
     pub fn warning(&self, path: &str, message: impl Into<String>) -> Diagnostic {
-        Diagnostic {
-            severity: Severity::Warning,
-            ..self.error(path, message)
-        }
+        Diagnostic { severity: Severity::Warning, ..self.error(path, message) }
     }
 
     /// The remarks in the order of the file, those about overrides last.
@@ -300,10 +268,7 @@ impl Source {
             Place::Text { line, column, .. } => (1, *line, *column),
             Place::Override(_) => (2, 0, 0),
         });
-        Diagnostics {
-            file: self.name.clone(),
-            list,
-        }
+        Diagnostics { file: self.name.clone(), list }
     }
 
     /// Line and column of a byte, both from one, columns in characters.
@@ -331,15 +296,11 @@ impl Source {
         let raw = match (&node.value, &node.origin) {
             (NodeValue::Table(_), _) => return node.kind().to_owned(),
             (_, Origin::Text(span)) => self.text.get(span.clone()),
-            (_, Origin::Override { index, whole: true }) => {
-                self.overrides.get(*index).map(|(_, value)| value.as_str())
-            }
+            (_, Origin::Override { index, whole: true }) => self.overrides.get(*index).map(|(_, value)| value.as_str()),
             _ => None,
         };
         match (raw, &node.value) {
-            (Some(raw), NodeValue::Array(_)) if raw.len() > 60 || raw.starts_with("[[") => {
-                node.kind().to_owned()
-            }
+            (Some(raw), NodeValue::Array(_)) if raw.len() > 60 || raw.starts_with("[[") => node.kind().to_owned(),
             (Some(raw), _) => shorten(raw),
             (None, NodeValue::Text(text)) => format!("\"{}\"", shorten(text)),
             (None, _) => node.kind().to_owned(),
@@ -348,10 +309,7 @@ impl Source {
 
     /// Remembers where a key path is written.
     pub(super) fn record(&mut self, path: &str, node: &Node) {
-        let spot = Spot {
-            origin: node.origin.clone(),
-            found: self.found(node),
-        };
+        let spot = Spot { origin: node.origin.clone(), found: self.found(node) };
         self.spots.insert(path.to_owned(), spot);
     }
 }

@@ -35,10 +35,7 @@ impl<'a> Context<'a> {
         let unit = layers.get("x-unit").and_then(Value::as_str).or(self.unit);
         let names = layers.get("x-expression").and_then(Value::as_array);
         let own = names.map(|names| names.iter().filter_map(Value::as_str).collect());
-        Self {
-            unit,
-            variables: own.or_else(|| self.variables.clone()),
-        }
+        Self { unit, variables: own.or_else(|| self.variables.clone()) }
     }
 
     pub fn dimension(&self) -> Dimension {
@@ -48,9 +45,7 @@ impl<'a> Context<'a> {
     /// `a pressure in Pa, kPa, MPa above 0`.
     pub fn allowed(&self, layers: &Layers<'_>) -> String {
         let dimension = self.dimension();
-        let range = layers
-            .range()
-            .map_or_else(String::new, |r| format!(", {r}"));
+        let range = layers.range().map_or_else(String::new, |r| format!(", {r}"));
         let name = dimension.name();
         let units = dimension.units();
         if dimension.is_one() {
@@ -108,15 +103,8 @@ impl<'a> Layers<'a> {
     /// ones have been chosen from.
     pub fn alternatives(&self) -> Option<Vec<&'a Value>> {
         let last = self.list.last()?;
-        let list = last
-            .get("oneOf")
-            .or_else(|| last.get("anyOf"))?
-            .as_array()?;
-        Some(
-            list.iter()
-                .filter(|s| s.is_object() && !is_null(s))
-                .collect(),
-        )
+        let list = last.get("oneOf").or_else(|| last.get("anyOf"))?.as_array()?;
+        Some(list.iter().filter(|s| s.is_object() && !is_null(s)).collect())
     }
 
     /// The range of a number in words that follow "must be".
@@ -192,9 +180,9 @@ impl<'a> Layers<'a> {
         if let Some(variants) = self.variants() {
             return match &node.value {
                 NodeValue::Text(text) => variants.iter().any(|variant| variant.name == text),
-                NodeValue::Table(entries) => entries
-                    .iter()
-                    .any(|entry| variants.iter().any(|variant| variant.name == entry.key)),
+                NodeValue::Table(entries) => {
+                    entries.iter().any(|entry| variants.iter().any(|variant| variant.name == entry.key))
+                }
                 _ => false,
             };
         }
@@ -246,9 +234,7 @@ impl<'a> Layers<'a> {
             let example = units.split(", ").nth(1).unwrap_or(unit);
             let name = dimension.name();
             let name = name.split_once(' ').map_or("", |(_, noun)| noun);
-            return format!(
-                "a number with a unit of {name} ({unit}){range}, e.g. 2.5 or \"2.5 {example}\"{formula}"
-            );
+            return format!("a number with a unit of {name} ({unit}){range}, e.g. 2.5 or \"2.5 {example}\"{formula}");
         }
         if has("integer") {
             return format!("a whole number{range}");
@@ -292,9 +278,7 @@ impl<'a> Layers<'a> {
             return format!("<{}>", names.join(" or "));
         }
         if let Some(union) = self.alternatives() {
-            let all = union
-                .iter()
-                .map(|s| Self::of(self.root, s).placeholder(context));
+            let all = union.iter().map(|s| Self::of(self.root, s).placeholder(context));
             return all.collect::<Vec<_>>().join(" or ");
         }
         let kinds = self.kinds();
@@ -307,10 +291,9 @@ impl<'a> Layers<'a> {
         }
         if has("array") {
             let count = self.get("minItems").and_then(Value::as_u64);
-            let item = self.get("items").map_or_else(
-                || "...".to_owned(),
-                |item| Self::of(self.root, item).placeholder(context),
-            );
+            let item = self
+                .get("items")
+                .map_or_else(|| "...".to_owned(), |item| Self::of(self.root, item).placeholder(context));
             return match count {
                 Some(count @ 2..=3) => format!("[{}]", vec![item; count as usize].join(", ")),
                 _ => format!("[{item}, ...]"),
@@ -325,11 +308,7 @@ impl<'a> Layers<'a> {
                 _ => format!("{{ {} }}", keys.join(", ")),
             };
         }
-        let plain = [
-            ("integer", "<whole number>"),
-            ("string", "\"<text>\""),
-            ("boolean", "<true or false>"),
-        ];
+        let plain = [("integer", "<whole number>"), ("string", "\"<text>\""), ("boolean", "<true or false>")];
         let found = plain.iter().find(|(kind, _)| has(kind));
         found.map_or("...", |(_, text)| text).to_owned()
     }
@@ -360,11 +339,7 @@ fn names_of(map: &Map<String, Value>) -> Option<Vec<&str>> {
         return name.as_str().map(|name| vec![name]);
     }
     let names = map.get("enum")?.as_array()?;
-    names
-        .iter()
-        .filter(|n| !n.is_null())
-        .map(Value::as_str)
-        .collect()
+    names.iter().filter(|n| !n.is_null()).map(Value::as_str).collect()
 }
 
 /// An object of one property that is required is a variant with data.
@@ -373,8 +348,5 @@ fn data_variant(map: &Map<String, Value>) -> Option<Variant<'_>> {
     let required = map.get("required")?.as_array()?;
     let (name, data) = properties.iter().next()?;
     let alone = properties.len() == 1 && required.len() == 1;
-    (alone && required[0] == name.as_str()).then_some(Variant {
-        name,
-        data: Some(data),
-    })
+    (alone && required[0] == name.as_str()).then_some(Variant { name, data: Some(data) })
 }

@@ -75,19 +75,14 @@ impl Node {
         };
         match value {
             DeValue::String(text) => NodeValue::Text(text.to_string()),
-            DeValue::Integer(number) => {
-                NodeValue::Integer(i64::from_str_radix(number.as_str(), number.radix()).ok())
-            }
+            DeValue::Integer(number) => NodeValue::Integer(i64::from_str_radix(number.as_str(), number.radix()).ok()),
             // "1e999" is read as infinite, which no key accepts.
             DeValue::Float(number) => NodeValue::Float(number.as_str().parse().unwrap_or(f64::NAN)),
             DeValue::Boolean(value) => NodeValue::Boolean(*value),
             DeValue::Datetime(_) => NodeValue::Date,
-            DeValue::Array(items) => NodeValue::Array(
-                items
-                    .iter()
-                    .map(|item| child(item.get_ref(), item.span()))
-                    .collect(),
-            ),
+            DeValue::Array(items) => {
+                NodeValue::Array(items.iter().map(|item| child(item.get_ref(), item.span())).collect())
+            }
             DeValue::Table(table) => NodeValue::Table(entries(table, origin)),
         }
     }
@@ -102,10 +97,7 @@ fn entries(table: &DeTable<'_>, origin: &dyn Fn(Range<usize>, bool) -> Origin) -
         .map(|(key, value)| Entry {
             key: key.get_ref().to_string(),
             key_origin: origin(key.span(), true),
-            node: Node {
-                value: Node::from_toml(value.get_ref(), origin),
-                origin: origin(value.span(), false),
-            },
+            node: Node { value: Node::from_toml(value.get_ref(), origin), origin: origin(value.span(), false) },
         })
         .collect()
 }
@@ -153,11 +145,7 @@ fn syntax_diagnostic(source: &Source, error: &TomlError, start: usize) -> Diagno
         return Diagnostic::error(place, "", deep);
     }
     if message != DUPLICATE {
-        let line_after = source
-            .text
-            .get(start..)
-            .and_then(|rest| rest.lines().next())
-            .map_or("", str::trim);
+        let line_after = source.text.get(start..).and_then(|rest| rest.lines().next()).map_or("", str::trim);
         let no_value = line_after.is_empty() || line_after.starts_with('#');
         if no_value && message.contains("must be quoted") {
             return Diagnostic::error(place, "", "a value is missing");
@@ -193,12 +181,7 @@ fn first_definition(source: &Source, start: usize) -> Option<usize> {
         Some(inside.split(']').next().unwrap_or("").to_owned())
     };
     let line_of_error = source.position(start).0;
-    let lines: Vec<String> = source
-        .text
-        .lines()
-        .take(line_of_error)
-        .map(squeeze)
-        .collect();
+    let lines: Vec<String> = source.text.lines().take(line_of_error).map(squeeze).collect();
     let this = lines.last()?;
     let mut table = String::new();
     let mut definitions = Vec::new();
@@ -214,9 +197,8 @@ fn first_definition(source: &Source, start: usize) -> Option<usize> {
     }
     let wanted = definitions.pop()?;
     let below = format!("{wanted}.");
-    let clashes = |path: &String| {
-        *path == wanted || path.starts_with(&below) || wanted.starts_with(&format!("{path}."))
-    };
+    let clashes =
+        |path: &String| *path == wanted || path.starts_with(&below) || wanted.starts_with(&format!("{path}."));
     let exact = definitions.iter().rposition(|path| *path == wanted);
     let is_header = this.starts_with('[');
     // A table may be opened after its parent or its children; only a key clashes with those.
@@ -228,11 +210,7 @@ fn first_definition(source: &Source, start: usize) -> Option<usize> {
 }
 
 /// Puts the values of `--set key.path=value` into the tree.
-pub(super) fn apply(
-    root: &mut Node,
-    overrides: &[(String, String)],
-    source: &Source,
-) -> Vec<Diagnostic> {
+pub(super) fn apply(root: &mut Node, overrides: &[(String, String)], source: &Source) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (index, (path, text)) in overrides.iter().enumerate() {
         if let Err((message, help)) = apply_one(root, index, path, text) {
@@ -249,10 +227,7 @@ pub(super) fn apply(
 type Misfit = (String, Option<String>);
 
 fn apply_one(root: &mut Node, index: usize, path: &str, text: &str) -> Result<(), Misfit> {
-    let origin = Origin::Override {
-        index,
-        whole: false,
-    };
+    let origin = Origin::Override { index, whole: false };
     let segments = segments(path)?;
     let mut node = root;
     let mut walked = String::new();
@@ -265,10 +240,7 @@ fn apply_one(root: &mut Node, index: usize, path: &str, text: &str) -> Result<()
                     entries.push(Entry {
                         key: segment.clone(),
                         key_origin: origin.clone(),
-                        node: Node {
-                            value: NodeValue::Table(Vec::new()),
-                            origin: origin.clone(),
-                        },
+                        node: Node { value: NodeValue::Table(Vec::new()), origin: origin.clone() },
                     });
                     entries.len() - 1
                 });
@@ -339,11 +311,7 @@ impl Source {
         match origin {
             Origin::Text(span) => {
                 let (line, column) = self.position(span.start);
-                Place::Text {
-                    file: self.name.clone(),
-                    line,
-                    column,
-                }
+                Place::Text { file: self.name.clone(), line, column }
             }
             Origin::Override { index, .. } => {
                 let (path, value) = &self.overrides[*index];

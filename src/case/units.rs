@@ -102,16 +102,8 @@ const QUANTITIES: [(&str, &str, &str); 23] = [
     ("a density", "kg/m^3", "kg/m^3, g/cm^3"),
     ("a frequency", "1/s", "1/s, Hz, kHz, MHz"),
     ("an energy per area", "J/m^2", "J/m^2, kJ/m^2, N/m, N/mm"),
-    (
-        "a force per volume",
-        "N/m^3",
-        "N/m^3, kN/m^3, N/mm^3, MPa/mm",
-    ),
-    (
-        "a fracture toughness",
-        "Pa*m^0.5",
-        "Pa*m^0.5, MPa*m^0.5, N/mm^1.5",
-    ),
+    ("a force per volume", "N/m^3", "N/m^3, kN/m^3, N/mm^3, MPa/mm"),
+    ("a fracture toughness", "Pa*m^0.5", "Pa*m^0.5, MPa*m^0.5, N/mm^1.5"),
     ("a dynamic viscosity", "Pa*s", "Pa*s, mPa*s"),
     ("a diffusivity", "m^2/s", "m^2/s, mm^2/s"),
     ("a thermal expansion", "1/K", "1/K"),
@@ -171,9 +163,7 @@ impl Unit {
         }
         let unit = product(&mut rest)?;
         if !rest.is_empty() {
-            return Err(UnitError::new(format!(
-                "the unit `{text}` cannot be read at `{rest}`"
-            )));
+            return Err(UnitError::new(format!("the unit `{text}` cannot be read at `{rest}`")));
         }
         Ok(unit)
     }
@@ -185,11 +175,7 @@ impl Unit {
             None => (number, 0),
         };
         let tens = exponent.checked_add(self.twice_tens.div_euclid(2))?;
-        let root = if self.twice_tens.rem_euclid(2) == 1 {
-            10f64.sqrt()
-        } else {
-            1.0
-        };
+        let root = if self.twice_tens.rem_euclid(2) == 1 { 10f64.sqrt() } else { 1.0 };
         let factor = self.factor * root;
         // The power of ten comes last, in decimal: an inch is 254 ten-thousandths of a metre.
         if factor == 1.0 {
@@ -201,11 +187,7 @@ impl Unit {
     }
 
     fn one() -> Self {
-        Self {
-            dimension: Dimension::default(),
-            factor: 1.0,
-            twice_tens: 0,
-        }
+        Self { dimension: Dimension::default(), factor: 1.0, twice_tens: 0 }
     }
 
     /// `self * other^(twice/2)`.
@@ -221,10 +203,7 @@ impl Unit {
 
 impl UnitError {
     fn new(message: impl Into<String>) -> Self {
-        Self {
-            message: message.into(),
-            help: None,
-        }
+        Self { message: message.into(), help: None }
     }
 }
 
@@ -250,14 +229,10 @@ fn power(rest: &mut &str, unit: Unit, sign: i16) -> Result<Unit, UnitError> {
     let base = if let Some(inside) = rest.strip_prefix('(') {
         *rest = inside;
         let inner = product(rest)?;
-        *rest = rest
-            .strip_prefix(')')
-            .ok_or_else(|| UnitError::new("the unit has a bracket that is not closed"))?;
+        *rest = rest.strip_prefix(')').ok_or_else(|| UnitError::new("the unit has a bracket that is not closed"))?;
         inner
     } else {
-        let end = rest
-            .find(|c: char| !(c.is_alphabetic() || "%°1".contains(c)))
-            .unwrap_or(rest.len());
+        let end = rest.find(|c: char| !(c.is_alphabetic() || "%°1".contains(c))).unwrap_or(rest.len());
         let (name, after) = rest.split_at(end);
         if name.is_empty() {
             if rest.is_empty() {
@@ -284,9 +259,7 @@ fn power(rest: &mut &str, unit: Unit, sign: i16) -> Result<Unit, UnitError> {
     *rest = &rest[length..];
     let twice = 2.0 * exponent;
     if twice.fract() != 0.0 || !(-24.0..=24.0).contains(&twice) {
-        return Err(UnitError::new(
-            "a unit's power must be a whole or half number such as `^2`, `^-1` or `^0.5`",
-        ));
+        return Err(UnitError::new("a unit's power must be a whole or half number such as `^2`, `^-1` or `^0.5`"));
     }
     // A power of a power of a half power has no exact exponent here; nobody writes one.
     let exact = |n: i32| n * (twice as i32) % 2 == 0;
@@ -321,10 +294,7 @@ fn symbol(name: &str) -> Result<Unit, UnitError> {
         "C" | "degC" | "°C" | "F" | "degF" | "°F" => Some("give the temperature in K".to_owned()),
         _ => suggestion(name).map(|unit| format!("did you mean `{unit}`?")),
     };
-    Err(UnitError {
-        message: format!("unknown unit `{name}`"),
-        help,
-    })
+    Err(UnitError { message: format!("unknown unit `{name}`"), help })
 }
 
 /// The unit proposed for a misspelt one; one that differs in case only is preferred.
@@ -359,10 +329,7 @@ impl Dimension {
     /// What it is called: `a pressure`, or `a quantity in m^2 kg s^-1` where there is no name.
     pub fn name(self) -> String {
         let named = QUANTITIES.iter().find(|entry| Self::of(entry.1) == self);
-        named.map_or_else(
-            || format!("a quantity in {}", self.in_base_units()),
-            |entry| entry.0.to_owned(),
-        )
+        named.map_or_else(|| format!("a quantity in {}", self.in_base_units()), |entry| entry.0.to_owned())
     }
 
     /// The units to propose: `Pa, kPa, MPa`.
@@ -431,9 +398,7 @@ mod tests {
 
     #[test]
     fn an_expression_is_not_a_number_with_a_unit() {
-        for text in [
-            "2*h", "delta/4", "sigma", "5e-5", "1/0.5", "", "-", "3 (m)", "1/s",
-        ] {
+        for text in ["2*h", "delta/4", "sigma", "5e-5", "1/0.5", "", "-", "3 (m)", "1/s"] {
             assert_eq!(split_quantity(text), None, "{text}");
         }
     }
@@ -443,22 +408,14 @@ mod tests {
         let table = [
             ("furlong", "unknown unit `furlong`", None),
             ("GPA", "unknown unit `GPA`", Some("did you mean `GPa`?")),
-            (
-                "degC",
-                "unknown unit `degC`",
-                Some("give the temperature in K"),
-            ),
+            ("degC", "unknown unit `degC`", Some("give the temperature in K")),
             ("m^", "a unit's power must be", None),
             ("m^0.3", "a unit's power must be", None),
             ("(m", "bracket", None),
             ("m)", "cannot be read at `)`", None),
             ("m/", "ends too early", None),
             ("((m^12)^12)^12", "too large", None),
-            (
-                "GPa/2",
-                "a unit cannot start with `2`",
-                Some("a unit follows a single number; name it in [constants]"),
-            ),
+            ("GPa/2", "a unit cannot start with `2`", Some("a unit follows a single number; name it in [constants]")),
         ];
         for (text, message, help) in table {
             let error = Unit::parse(text).expect_err(text);

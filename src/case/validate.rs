@@ -25,18 +25,11 @@ pub(super) fn validate(
     constants: &Constants,
     source: &mut Source,
 ) -> (Value, Vec<Diagnostic>) {
-    let mut validator = Validator {
-        schema,
-        constants,
-        source,
-        mistakes: Vec::new(),
-    };
+    let mut validator = Validator { schema, constants, source, mistakes: Vec::new() };
     let value = validator.check(root, schema, &Context::default(), "");
     let mut mistakes = validator.mistakes;
     if mistakes.len() >= MOST_MISTAKES {
-        let place = Place::File {
-            file: source.name.clone(),
-        };
+        let place = Place::File { file: source.name.clone() };
         let message = format!("only {MOST_MISTAKES} mistakes are shown");
         mistakes.truncate(MOST_MISTAKES);
         mistakes.push(Diagnostic::warning(place, "", message));
@@ -52,35 +45,17 @@ struct Validator<'a> {
 }
 
 impl<'a> Validator<'a> {
-    fn check(
-        &mut self,
-        node: &Node,
-        schema: &'a Value,
-        context: &Context<'a>,
-        path: &str,
-    ) -> Option<Value> {
+    fn check(&mut self, node: &Node, schema: &'a Value, context: &Context<'a>, path: &str) -> Option<Value> {
         self.source.record(path, node);
         self.check_unrecorded(node, schema, context, path)
     }
 
-    fn check_unrecorded(
-        &mut self,
-        node: &Node,
-        schema: &'a Value,
-        context: &Context<'a>,
-        path: &str,
-    ) -> Option<Value> {
+    fn check_unrecorded(&mut self, node: &Node, schema: &'a Value, context: &Context<'a>, path: &str) -> Option<Value> {
         let layers = Layers::of(self.schema, schema);
         self.check_layers(node, &layers, context, path)
     }
 
-    fn check_layers(
-        &mut self,
-        node: &Node,
-        layers: &Layers<'a>,
-        context: &Context<'a>,
-        path: &str,
-    ) -> Option<Value> {
+    fn check_layers(&mut self, node: &Node, layers: &Layers<'a>, context: &Context<'a>, path: &str) -> Option<Value> {
         if self.mistakes.len() >= MOST_MISTAKES {
             return None;
         }
@@ -92,11 +67,7 @@ impl<'a> Validator<'a> {
         let has = |kind: &str| kinds.contains(&kind);
         let union = layers.alternatives().unwrap_or_default();
         let union: Vec<_> = union.iter().map(|s| layers.clone().then(s)).collect();
-        let choices: Vec<_> = union
-            .iter()
-            .filter_map(Layers::variants)
-            .flatten()
-            .collect();
+        let choices: Vec<_> = union.iter().filter_map(Layers::variants).flatten().collect();
         if choices.is_empty()
             && has("number")
             && (has("string") || layers.get("x-expression").is_some())
@@ -120,12 +91,8 @@ impl<'a> Validator<'a> {
             };
         }
         match &node.value {
-            NodeValue::Table(entries) if has("object") => {
-                self.check_table(node, entries, layers, context, path)
-            }
-            NodeValue::Array(items) if has("array") => {
-                self.check_list(node, items, layers, context, path)
-            }
+            NodeValue::Table(entries) if has("object") => self.check_table(node, entries, layers, context, path),
+            NodeValue::Array(items) if has("array") => self.check_list(node, items, layers, context, path),
             NodeValue::Boolean(value) if has("boolean") => Some(Value::from(*value)),
             NodeValue::Integer(_) | NodeValue::Float(_) if has("number") => {
                 self.check_number(node, layers, context, path)
@@ -146,12 +113,7 @@ impl<'a> Validator<'a> {
     }
 
     /// The choice of a union that a text is near to, unless it is one or means a number.
-    fn misspelt_choice<'v>(
-        &self,
-        text: &str,
-        choices: &'v [Variant<'a>],
-        context: &Context<'a>,
-    ) -> Option<&'v str> {
+    fn misspelt_choice<'v>(&self, text: &str, choices: &'v [Variant<'a>], context: &Context<'a>) -> Option<&'v str> {
         let variables = context.variables.iter().flatten().copied();
         let constants = self.constants.known.iter().map(|(name, _)| name.as_str());
         let failed = self.constants.failed.iter().map(String::as_str);
@@ -220,12 +182,9 @@ impl<'a> Validator<'a> {
             let place = self.source.place_of(&node.origin);
             let message = format!("missing key `{name}`");
             let schema = properties.and_then(|map| map.get(name));
-            let line = schema.map_or_else(String::new, |schema| {
-                Layers::of(self.schema, schema).line(name, context)
-            });
+            let line = schema.map_or_else(String::new, |schema| Layers::of(self.schema, schema).line(name, context));
             let path = join(path, name);
-            self.mistakes
-                .push(Diagnostic::error(place, &path, message).help(line));
+            self.mistakes.push(Diagnostic::error(place, &path, message).help(line));
         }
         sound.then_some(Value::Object(result))
     }
@@ -246,15 +205,9 @@ impl<'a> Validator<'a> {
             let wanted = if least == most {
                 format!("{least} entries")
             } else if count < least {
-                format!(
-                    "at least {least} {}",
-                    if least == 1 { "entry" } else { "entries" }
-                )
+                format!("at least {least} {}", if least == 1 { "entry" } else { "entries" })
             } else {
-                format!(
-                    "at most {most} {}",
-                    if most == 1 { "entry" } else { "entries" }
-                )
+                format!("at most {most} {}", if most == 1 { "entry" } else { "entries" })
             };
             let message = format!("the list must have {wanted}, not {count}");
             return self.refuse(node, path, message, None);
@@ -267,9 +220,7 @@ impl<'a> Validator<'a> {
             let schema = each.and_then(|each| each.get(index)).or(rest);
             let item_path = format!("{path}[{index}]");
             let value = match schema {
-                Some(schema) if index < MOST_LOCATED => {
-                    self.check(item, schema, context, &item_path)
-                }
+                Some(schema) if index < MOST_LOCATED => self.check(item, schema, context, &item_path),
                 Some(schema) => self.check_unrecorded(item, schema, context, &item_path),
                 None => Some(raw(item)),
             };
@@ -297,10 +248,7 @@ impl<'a> Validator<'a> {
         match &node.value {
             NodeValue::Text(text) => match find(text) {
                 Some(Variant { data: None, .. }) => Some(Value::from(text.as_str())),
-                Some(Variant {
-                    name,
-                    data: Some(data),
-                }) => {
+                Some(Variant { name, data: Some(data) }) => {
                     let example = Layers::of(self.schema, data).placeholder(context);
                     let message = format!("`{name}` needs data of its own");
                     let diagnostic = self.located(node, path, message);
@@ -321,27 +269,20 @@ impl<'a> Validator<'a> {
                     let child_path = join(path, &entry.key);
                     let place = self.source.place_of(&entry.key_origin);
                     match find(&entry.key) {
-                        Some(Variant {
-                            name,
-                            data: Some(data),
-                        }) => {
+                        Some(Variant { name, data: Some(data) }) => {
                             known += 1;
                             let value = self.check(&entry.node, data, context, &child_path);
-                            result = value.map(|value| {
-                                Value::Object(Map::from_iter([((*name).to_owned(), value)]))
-                            });
+                            result = value.map(|value| Value::Object(Map::from_iter([((*name).to_owned(), value)])));
                         }
                         Some(Variant { name, data: None }) => {
                             let message = format!("`{name}` has no keys");
                             let help = format!("write it as the text `\"{name}\"`");
-                            return self
-                                .report(Diagnostic::error(place, &child_path, message).help(help));
+                            return self.report(Diagnostic::error(place, &child_path, message).help(help));
                         }
                         None => {
                             let message = format!("there is no choice `{}`", shorten(&entry.key));
                             let near = did_you_mean(&entry.key, variants.iter().map(|v| v.name));
-                            let mut diagnostic =
-                                Diagnostic::error(place, &child_path, message).allowed(list());
+                            let mut diagnostic = Diagnostic::error(place, &child_path, message).allowed(list());
                             diagnostic.help = near.map(|name| format!("did you mean `{name}`?"));
                             return self.report(diagnostic);
                         }
@@ -364,13 +305,7 @@ impl<'a> Validator<'a> {
         }
     }
 
-    fn check_number(
-        &mut self,
-        node: &Node,
-        layers: &Layers<'a>,
-        context: &Context<'a>,
-        path: &str,
-    ) -> Option<Value> {
+    fn check_number(&mut self, node: &Node, layers: &Layers<'a>, context: &Context<'a>, path: &str) -> Option<Value> {
         let number = match &node.value {
             NodeValue::Integer(Some(value)) => *value as f64,
             NodeValue::Integer(None) => {
@@ -390,19 +325,11 @@ impl<'a> Validator<'a> {
         serde_json::Number::from_f64(number).map(Value::Number)
     }
 
-    fn check_integer(
-        &mut self,
-        node: &Node,
-        layers: &Layers<'a>,
-        context: &Context<'a>,
-        path: &str,
-    ) -> Option<Value> {
+    fn check_integer(&mut self, node: &Node, layers: &Layers<'a>, context: &Context<'a>, path: &str) -> Option<Value> {
         let whole = match &node.value {
             NodeValue::Integer(value) => *value,
             // 1e3 is a whole number to everybody but TOML; beyond 2^53 it is not an exact one.
-            NodeValue::Float(value) if value.fract() == 0.0 && value.abs() <= 2f64.powi(53) => {
-                Some(*value as i64)
-            }
+            NodeValue::Float(value) if value.fract() == 0.0 && value.abs() <= 2f64.powi(53) => Some(*value as i64),
             NodeValue::Float(value) if value.is_finite() => {
                 return self.refuse(node, path, "must be a whole number", layers.range());
             }
@@ -459,9 +386,7 @@ impl<'a> Validator<'a> {
             && limit("exclusiveMinimum").is_none_or(|below| number > below)
             && limit("exclusiveMaximum").is_none_or(|above| number < above);
         match range {
-            Some(range) if !inside => {
-                self.refuse(node, path, format!("must be {range}"), allowed(context))
-            }
+            Some(range) if !inside => self.refuse(node, path, format!("must be {range}"), allowed(context)),
             _ => Some(()),
         }
     }
@@ -475,10 +400,7 @@ impl<'a> Validator<'a> {
         context: &Context<'a>,
         path: &str,
     ) -> Option<Value> {
-        let number = match self
-            .constants
-            .quantity(text, Some(context.dimension()), variables)
-        {
+        let number = match self.constants.quantity(text, Some(context.dimension()), variables) {
             Some(Ok(number)) => number,
             Some(Err(mistake)) => return self.mistake(mistake, node, layers, context, path),
             None => match self.constants.compile(text, variables) {
@@ -513,24 +435,12 @@ impl<'a> Validator<'a> {
         }
     }
 
-    fn wrong_kind<R>(
-        &mut self,
-        node: &Node,
-        layers: &Layers<'a>,
-        context: &Context<'a>,
-        path: &str,
-    ) -> Option<R> {
+    fn wrong_kind<R>(&mut self, node: &Node, layers: &Layers<'a>, context: &Context<'a>, path: &str) -> Option<R> {
         let message = format!("must be {}", layers.wanted(context));
         self.refuse(node, path, message, None)
     }
 
-    fn refuse<R>(
-        &mut self,
-        node: &Node,
-        path: &str,
-        message: impl Into<String>,
-        allowed: Option<String>,
-    ) -> Option<R> {
+    fn refuse<R>(&mut self, node: &Node, path: &str, message: impl Into<String>, allowed: Option<String>) -> Option<R> {
         let mut diagnostic = self.located(node, path, message.into());
         diagnostic.allowed = allowed;
         self.report(diagnostic)
@@ -569,9 +479,7 @@ impl Source {
     /// The text of a value given as a whole with `--set`.
     fn override_text(&self, node: &Node) -> Option<&str> {
         match &node.origin {
-            Origin::Override { index, whole: true } => {
-                self.overrides.get(*index).map(|(_, text)| text.as_str())
-            }
+            Origin::Override { index, whole: true } => self.overrides.get(*index).map(|(_, text)| text.as_str()),
             _ => None,
         }
     }

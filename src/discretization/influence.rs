@@ -56,9 +56,7 @@ impl Influence {
         Influence::Linear,
         Influence::Inverted,
         Influence::Parabolic,
-        Influence::Gaussian {
-            width: Self::GAUSSIAN_WIDTH,
-        },
+        Influence::Gaussian { width: Self::GAUSSIAN_WIDTH },
         Influence::Cubic,
         Influence::Quintic,
         Influence::Septic,
@@ -83,11 +81,7 @@ impl Influence {
     /// A length that passes 1 by no more than [`RIM_TOLERANCE`] counts as 1, so that a point placed
     /// exactly on the horizon does not appear and vanish with rounding.
     pub fn value(&self, t: f64) -> f64 {
-        if t > 1.0 + RIM_TOLERANCE {
-            0.0
-        } else {
-            self.quadrature_value(t)
-        }
+        if t > 1.0 + RIM_TOLERANCE { 0.0 } else { self.quadrature_value(t) }
     }
 
     /// ω(min(t, 1)): the value that belongs to a quadrature point whose cell reaches into the ball.
@@ -120,11 +114,7 @@ impl Influence {
     /// t = 0, which is p ≤ −1, for `Inverted` p ≤ −2. The quotients are the integrals of the
     /// polynomials after one integration by parts, products only, so that nothing cancels.
     pub fn radial_moment(&self, p: f64) -> f64 {
-        let lowest_power = if *self == Influence::Inverted {
-            1.0
-        } else {
-            0.0
-        };
+        let lowest_power = if *self == Influence::Inverted { 1.0 } else { 0.0 };
         if p + lowest_power <= -1.0 {
             return f64::INFINITY;
         }
@@ -136,9 +126,7 @@ impl Influence {
             Influence::Gaussian { width } => gaussian_moment(width, p),
             Influence::Cubic => 6.0 / ((p + 1.0) * (p + 3.0) * (p + 4.0)),
             Influence::Quintic => 60.0 / ((p + 1.0) * (p + 4.0) * (p + 5.0) * (p + 6.0)),
-            Influence::Septic => {
-                840.0 / ((p + 1.0) * (p + 5.0) * (p + 6.0) * (p + 7.0) * (p + 8.0))
-            }
+            Influence::Septic => 840.0 / ((p + 1.0) * (p + 5.0) * (p + 6.0) * (p + 7.0) * (p + 8.0)),
         }
     }
 }
@@ -152,10 +140,7 @@ impl Influence {
 /// All terms are positive, so nothing cancels. T is 1, or for narrow bells the place where x = 400:
 /// what lies beyond is below e⁻⁴⁰⁰, and e⁻ˣ stays far from underflow.
 fn gaussian_moment(width: f64, p: f64) -> f64 {
-    assert!(
-        width > 0.0,
-        "the width of a Gaussian influence function must be positive, got {width}"
-    );
+    assert!(width > 0.0, "the width of a Gaussian influence function must be positive, got {width}");
     let a = 0.5 * (p + 1.0);
     let end = (20.0 * width).min(1.0);
     let x = (end / width).powi(2);
@@ -186,24 +171,14 @@ mod tests {
             Influence::Gaussian { width } => (-t * t / (width * width)).exp(),
             Influence::Cubic => 1.0 - 3.0 * t.powi(2) + 2.0 * t.powi(3),
             Influence::Quintic => 1.0 - 10.0 * t.powi(3) + 15.0 * t.powi(4) - 6.0 * t.powi(5),
-            Influence::Septic => {
-                1.0 - 35.0 * t.powi(4) + 84.0 * t.powi(5) - 70.0 * t.powi(6) + 20.0 * t.powi(7)
-            }
+            Influence::Septic => 1.0 - 35.0 * t.powi(4) + 84.0 * t.powi(5) - 70.0 * t.powi(6) + 20.0 * t.powi(7),
         };
         for influence in Influence::ALL {
             for step in 0..=1000 {
                 let t = f64::from(step) / 1000.0;
                 let omega = influence.value(t);
-                assert!(
-                    (omega - printed(&influence, t)).abs() < 1e-13,
-                    "{} at {t}",
-                    influence.name()
-                );
-                assert!(
-                    (0.0..=1.0).contains(&omega),
-                    "{} at {t} is {omega}",
-                    influence.name()
-                );
+                assert!((omega - printed(&influence, t)).abs() < 1e-13, "{} at {t}", influence.name());
+                assert!((0.0..=1.0).contains(&omega), "{} at {t} is {omega}", influence.name());
             }
         }
     }
@@ -214,12 +189,7 @@ mod tests {
             let rim = influence.value(1.0);
             assert_eq!(influence.value(1.0 + 1e-12), rim, "{}", influence.name());
             assert_eq!(influence.value(1.0 + 1e-6), 0.0, "{}", influence.name());
-            assert_eq!(
-                influence.quadrature_value(1.15),
-                rim,
-                "{}",
-                influence.name()
-            );
+            assert_eq!(influence.quadrature_value(1.15), rim, "{}", influence.name());
         }
         assert_eq!(Influence::Constant.quadrature_value(1.1), 1.0);
         assert_eq!(Influence::Inverted.quadrature_value(1.1), 1.0);
@@ -235,21 +205,12 @@ mod tests {
                 let expected: f64 = (0..40)
                     .map(|k| {
                         let panel = |k: i32| f64::from(k) / 40.0;
-                        integrate(
-                            |t| influence.value(t) * t.powf(p),
-                            panel(k),
-                            panel(k + 1),
-                            20,
-                        )
+                        integrate(|t| influence.value(t) * t.powf(p), panel(k), panel(k + 1), 20)
                     })
                     .sum();
                 let moment = influence.radial_moment(p);
                 let error = (moment - expected).abs() / expected;
-                assert!(
-                    error < 2e-14,
-                    "{} p={p}: {moment} against {expected}",
-                    influence.name()
-                );
+                assert!(error < 2e-14, "{} p={p}: {moment} against {expected}", influence.name());
             }
         }
     }
@@ -259,17 +220,11 @@ mod tests {
         let near = |a: f64, b: f64| (a - b).abs() < 1e-13 * b;
         assert!(near(Influence::Constant.radial_moment(-0.5), 2.0));
         assert!(near(Influence::Inverted.radial_moment(-1.0), 1.0));
-        assert!(near(
-            Influence::Gaussian { width: 1e3 }.radial_moment(-0.5),
-            2.0 - 2.0 / 5.0 * 1e-6
-        ));
+        assert!(near(Influence::Gaussian { width: 1e3 }.radial_moment(-0.5), 2.0 - 2.0 / 5.0 * 1e-6));
         assert_eq!(Influence::Constant.radial_moment(-1.0), f64::INFINITY);
         assert_eq!(Influence::Linear.radial_moment(-1.5), f64::INFINITY);
         assert_eq!(Influence::Inverted.radial_moment(-2.0), f64::INFINITY);
-        assert_eq!(
-            Influence::Gaussian { width: 0.3 }.radial_moment(-1.0),
-            f64::INFINITY
-        );
+        assert_eq!(Influence::Gaussian { width: 0.3 }.radial_moment(-1.0), f64::INFINITY);
     }
 
     #[test]
@@ -285,11 +240,7 @@ mod tests {
     #[test]
     fn names_are_distinct() {
         for (i, a) in Influence::ALL.iter().enumerate() {
-            assert!(
-                Influence::ALL[..i].iter().all(|b| a.name() != b.name()),
-                "{}",
-                a.name()
-            );
+            assert!(Influence::ALL[..i].iter().all(|b| a.name() != b.name()), "{}", a.name());
         }
     }
 }

@@ -18,29 +18,15 @@ use super::influence::Influence;
 ///
 /// with S the sphere moment ([`sphere_moment`]) and R the radial moment of ω. Zero if any exponent
 /// is odd. Infinite where the integral diverges at ξ = 0. Unit: m^(p+1).
-pub fn ball_moment<const D: usize>(
-    influence: &Influence,
-    exponents: [u32; D],
-    q: f64,
-    horizon: f64,
-) -> f64 {
-    if exponents.iter().any(|a| a % 2 == 1) {
-        0.0
-    } else {
-        absolute_ball_moment(influence, exponents, q, horizon)
-    }
+pub fn ball_moment<const D: usize>(influence: &Influence, exponents: [u32; D], q: f64, horizon: f64) -> f64 {
+    if exponents.iter().any(|a| a % 2 == 1) { 0.0 } else { absolute_ball_moment(influence, exponents, q, horizon) }
 }
 
 /// The same with |ξ₁|^a |ξ₂|^b |ξ₃|^c in place of the monomial, so that odd exponents count too.
 ///
 /// ∫ ω |ξ| |ξ₁| dV is what all bonds that cross a plane hold together, the integral behind the
 /// fracture energy.
-pub fn absolute_ball_moment<const D: usize>(
-    influence: &Influence,
-    exponents: [u32; D],
-    q: f64,
-    horizon: f64,
-) -> f64 {
+pub fn absolute_ball_moment<const D: usize>(influence: &Influence, exponents: [u32; D], q: f64, horizon: f64) -> f64 {
     let p = f64::from(exponents.iter().sum::<u32>()) + D as f64 - 1.0 - q;
     sphere_moment(exponents) * horizon.powf(p + 1.0) * influence.radial_moment(p)
 }
@@ -55,14 +41,8 @@ pub fn sphere_moment<const D: usize>(exponents: [u32; D]) -> f64 {
 
 /// Γ(n/2) for n ≥ 1, from Γ(1/2) = √π, Γ(1) = 1 and Γ(x + 1) = x Γ(x).
 fn gamma_of_half(n: u32) -> f64 {
-    let (start, first) = if n % 2 == 1 {
-        (std::f64::consts::PI.sqrt(), 1)
-    } else {
-        (1.0, 2)
-    };
-    (first..n)
-        .step_by(2)
-        .fold(start, |gamma, k| gamma * 0.5 * f64::from(k))
+    let (start, first) = if n % 2 == 1 { (std::f64::consts::PI.sqrt(), 1) } else { (1.0, 2) };
+    (first..n).step_by(2).fold(start, |gamma, k| gamma * 0.5 * f64::from(k))
 }
 
 #[cfg(test)]
@@ -77,9 +57,7 @@ mod tests {
     fn brute_force(dimension: usize, f: impl Fn(f64, [f64; 3]) -> f64) -> f64 {
         // Angles in quarter circles, where |cos| and |sin| are smooth.
         let quarters = |g: &dyn Fn(f64) -> f64, n: i32| -> f64 {
-            (0..n)
-                .map(|k| integrate(g, 0.5 * PI * f64::from(k), 0.5 * PI * f64::from(k + 1), 12))
-                .sum()
+            (0..n).map(|k| integrate(g, 0.5 * PI * f64::from(k), 0.5 * PI * f64::from(k + 1), 12)).sum()
         };
         let at_radius = |r: f64| match dimension {
             1 => f(r, [r, 0.0, 0.0]) + f(r, [-r, 0.0, 0.0]),
@@ -104,25 +82,15 @@ mod tests {
                         continue;
                     }
                     let kernel = |r: f64| influence.value(r / HORIZON) * r.powf(-q);
-                    let monomial = |xi: [f64; 3]| {
-                        (0..D)
-                            .map(|i| xi[i].powi(exponents[i] as i32))
-                            .product::<f64>()
-                    };
+                    let monomial = |xi: [f64; 3]| (0..D).map(|i| xi[i].powi(exponents[i] as i32)).product::<f64>();
                     let signed = brute_force(D, |r, xi| kernel(r) * monomial(xi));
                     let absolute = brute_force(D, |r, xi| kernel(r) * monomial(xi).abs());
                     let tolerance = 1e-12 * absolute;
                     let label = format!("{} {exponents:?} q={q}", influence.name());
                     let moment = ball_moment(&influence, *exponents, q, HORIZON);
-                    assert!(
-                        (moment - signed).abs() < tolerance,
-                        "{label}: {moment} against {signed}"
-                    );
+                    assert!((moment - signed).abs() < tolerance, "{label}: {moment} against {signed}");
                     let moment = absolute_ball_moment(&influence, *exponents, q, HORIZON);
-                    assert!(
-                        (moment - absolute).abs() < tolerance,
-                        "{label}: {moment} against {absolute}"
-                    );
+                    assert!((moment - absolute).abs() < tolerance, "{label}: {moment} against {absolute}");
                 }
             }
         }
@@ -135,38 +103,17 @@ mod tests {
 
     #[test]
     fn moments_in_two_dimensions_are_the_integrals() {
-        compare(&[
-            [0, 0],
-            [1, 0],
-            [1, 1],
-            [2, 0],
-            [0, 2],
-            [2, 2],
-            [4, 0],
-            [3, 1],
-            [6, 2],
-        ]);
+        compare(&[[0, 0], [1, 0], [1, 1], [2, 0], [0, 2], [2, 2], [4, 0], [3, 1], [6, 2]]);
     }
 
     #[test]
     fn moments_in_three_dimensions_are_the_integrals() {
-        compare(&[
-            [0, 0, 0],
-            [1, 0, 0],
-            [2, 0, 0],
-            [0, 2, 2],
-            [2, 1, 1],
-            [4, 0, 2],
-            [2, 2, 2],
-        ]);
+        compare(&[[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 2, 2], [2, 1, 1], [4, 0, 2], [2, 2, 2]]);
     }
 
     #[test]
     fn divergent_moments_are_infinite() {
-        assert_eq!(
-            ball_moment(&Influence::Constant, [2], 3.0, HORIZON),
-            f64::INFINITY
-        );
+        assert_eq!(ball_moment(&Influence::Constant, [2], 3.0, HORIZON), f64::INFINITY);
         let finite = ball_moment(&Influence::Inverted, [2], 3.0, HORIZON);
         assert!((finite - 2.0).abs() < 1e-14, "{finite}");
     }

@@ -32,10 +32,7 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
     let (mut previous, mut current) = (1.0, x);
     for k in 2..=n {
         let k = k as f64;
-        (previous, current) = (
-            current,
-            ((2.0 * k - 1.0) * x * current - (k - 1.0) * previous) / k,
-        );
+        (previous, current) = (current, ((2.0 * k - 1.0) * x * current - (k - 1.0) * previous) / k);
     }
     (current, n as f64 * (x * current - previous) / (x * x - 1.0))
 }
@@ -47,11 +44,7 @@ pub(crate) fn integrate(f: impl Fn(f64) -> f64, low: f64, high: f64, n: usize) -
     // Kept, because nested integrals ask for the same rule at every point.
     static RULES: [OnceLock<Vec<(f64, f64)>>; 41] = [const { OnceLock::new() }; 41];
     let width = high - low;
-    RULES[n]
-        .get_or_init(|| gauss_legendre(n))
-        .iter()
-        .map(|&(x, weight)| weight * width * f(low + width * x))
-        .sum()
+    RULES[n].get_or_init(|| gauss_legendre(n)).iter().map(|&(x, weight)| weight * width * f(low + width * x)).sum()
 }
 
 #[cfg(test)]
@@ -64,10 +57,7 @@ mod tests {
             for degree in 0..2 * n as i32 {
                 let exact = 1.0 / f64::from(degree + 1);
                 let value = integrate(|x| x.powi(degree), 0.0, 1.0, n);
-                assert!(
-                    (value - exact).abs() < 2e-15,
-                    "{n} points, degree {degree}: {value}"
-                );
+                assert!((value - exact).abs() < 2e-15, "{n} points, degree {degree}: {value}");
             }
         }
     }

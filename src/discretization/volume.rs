@@ -45,11 +45,7 @@ pub enum PartialVolume {
 
 impl PartialVolume {
     /// Every rule once.
-    pub const ALL: [PartialVolume; 3] = [
-        PartialVolume::None,
-        PartialVolume::Ramp,
-        PartialVolume::Exact,
-    ];
+    pub const ALL: [PartialVolume; 3] = [PartialVolume::None, PartialVolume::Ramp, PartialVolume::Exact];
 
     /// Name in case files and lists.
     pub fn name(&self) -> &'static str {
@@ -196,10 +192,7 @@ fn box_in_ball(x: (f64, f64), y: (f64, f64), z: (f64, f64), radius: f64) -> f64 
             let height = z0 + (z1 - z0) * theta.sin().powi(2);
             (2.0 * theta).sin() * rectangle_in_disk(x, y, half_chord(height.abs(), radius))
         };
-        let sum: f64 = rule
-            .iter()
-            .map(|&(t, weight)| weight * slice(from + (to - from) * t))
-            .sum();
+        let sum: f64 = rule.iter().map(|&(t, weight)| weight * slice(from + (to - from) * t)).sum();
         (z1 - z0) * (to - from) * sum
     };
     heights.windows(2).map(|pair| piece(pair[0], pair[1])).sum()
@@ -221,9 +214,8 @@ mod tests {
         let side = (2 * range + 1) as usize;
         (0..side.pow(D as u32))
             .map(|index| {
-                let xi = std::array::from_fn::<f64, D, _>(|i| {
-                    f64::from((index / side.pow(i as u32) % side) as i32 - range)
-                });
+                let xi =
+                    std::array::from_fn::<f64, D, _>(|i| f64::from((index / side.pow(i as u32) % side) as i32 - range));
                 rule.fraction(&xi, 1.0, horizon)
             })
             .sum()
@@ -235,16 +227,10 @@ mod tests {
             let sums = [
                 (lattice_sum::<1>(PartialVolume::Exact, m), 2.0 * m),
                 (lattice_sum::<2>(PartialVolume::Exact, m), PI * m.powi(2)),
-                (
-                    lattice_sum::<3>(PartialVolume::Exact, m),
-                    4.0 / 3.0 * PI * m.powi(3),
-                ),
+                (lattice_sum::<3>(PartialVolume::Exact, m), 4.0 / 3.0 * PI * m.powi(3)),
             ];
             for (sum, ball) in sums {
-                assert!(
-                    (sum - ball).abs() < 1e-12 * ball,
-                    "m={m}: {sum} against {ball}"
-                );
+                assert!((sum - ball).abs() < 1e-12 * ball, "m={m}: {sum} against {ball}");
             }
         }
     }
@@ -266,16 +252,12 @@ mod tests {
             let n: i32 = 6;
             let mut sum = 0.0;
             for index in 0..n * n * n {
-                let offset =
-                    |i: i32| (f64::from(index / n.pow(i as u32) % n) + 0.5) / f64::from(n) - 0.5;
+                let offset = |i: i32| (f64::from(index / n.pow(i as u32) % n) + 0.5) / f64::from(n) - 0.5;
                 let part = [xi[0] + offset(0), xi[1] + offset(1), xi[2] + offset(2)];
                 sum += PartialVolume::Exact.fraction(&part, 1.0 / f64::from(n), horizon);
             }
             let parts = sum / f64::from(n * n * n);
-            assert!(
-                (whole - parts).abs() < 1e-12,
-                "{xi:?}: {whole} against {parts}"
-            );
+            assert!((whole - parts).abs() < 1e-12, "{xi:?}: {whole} against {parts}");
         }
     }
 
@@ -303,26 +285,15 @@ mod tests {
 
     #[test]
     fn rounding_at_an_edge_never_decides() {
-        let edges = [
-            (PartialVolume::None, 3.0, 1.0),
-            (PartialVolume::Ramp, 2.5, 1.0),
-            (PartialVolume::Ramp, 3.5, 0.0),
-        ];
+        let edges = [(PartialVolume::None, 3.0, 1.0), (PartialVolume::Ramp, 2.5, 1.0), (PartialVolume::Ramp, 3.5, 0.0)];
         for (rule, edge, beta) in edges {
             for noise in [-1e-12, 0.0, 1e-12] {
-                assert_eq!(
-                    rule.fraction(&[edge + noise, 0.0], 1.0, 3.0),
-                    beta,
-                    "{rule:?} {edge} {noise}"
-                );
+                assert_eq!(rule.fraction(&[edge + noise, 0.0], 1.0, 3.0), beta, "{rule:?} {edge} {noise}");
             }
         }
         for noise in [-1e-12, 0.0, 1e-12] {
             assert_eq!(PartialVolume::Exact.fraction(&[2.5 + noise], 1.0, 3.0), 1.0);
-            assert_eq!(
-                PartialVolume::Exact.fraction(&[0.0, 3.5 + noise], 1.0, 3.0),
-                0.0
-            );
+            assert_eq!(PartialVolume::Exact.fraction(&[0.0, 3.5 + noise], 1.0, 3.0), 0.0);
         }
     }
 
@@ -332,28 +303,16 @@ mod tests {
         for rule in PartialVolume::ALL {
             for step in 0..200 {
                 let s = f64::from(step);
-                let (x, y, z) = (
-                    2.2 * (0.7 * s).sin(),
-                    2.4 * (1.3 * s).cos(),
-                    2.0 * (2.1 * s).sin(),
-                );
+                let (x, y, z) = (2.2 * (0.7 * s).sin(), 2.4 * (1.3 * s).cos(), 2.0 * (2.1 * s).sin());
                 let beta = rule.fraction(&[x, y, z], 0.9, horizon).to_bits();
                 let flat = rule.fraction(&[x, y], 0.9, horizon).to_bits();
                 for (a, b, c) in [(x, y, z), (y, x, z), (z, y, x), (y, z, x)] {
                     for sign in [[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0], [1.0, -1.0, 1.0]] {
                         let image = [sign[0] * a, sign[1] * b, sign[2] * c];
-                        assert_eq!(
-                            rule.fraction(&image, 0.9, horizon).to_bits(),
-                            beta,
-                            "{rule:?} {image:?}"
-                        );
+                        assert_eq!(rule.fraction(&image, 0.9, horizon).to_bits(), beta, "{rule:?} {image:?}");
                     }
                 }
-                assert_eq!(
-                    rule.fraction(&[-y, x], 0.9, horizon).to_bits(),
-                    flat,
-                    "{rule:?}"
-                );
+                assert_eq!(rule.fraction(&[-y, x], 0.9, horizon).to_bits(), flat, "{rule:?}");
             }
         }
     }
@@ -367,11 +326,7 @@ mod tests {
             let reach = rule.reach::<D>(spacing, horizon);
             assert_eq!(at(reach * (1.0 + 1e-12) + 1e-8), 0.0, "{rule:?}");
             for step in 0..100 {
-                assert_eq!(
-                    at(reach * (1.001 + 0.01 * f64::from(step))),
-                    0.0,
-                    "{rule:?}"
-                );
+                assert_eq!(at(reach * (1.001 + 0.01 * f64::from(step))), 0.0, "{rule:?}");
             }
         }
         for rule in PartialVolume::ALL {

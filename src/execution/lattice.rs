@@ -139,7 +139,8 @@ unsafe fn sum_block<const D: usize, const I: usize, const O: usize, K: BondKerne
     let mut watch = Pack::splat(0.0);
     for half in 0..BLOCK / LANES {
         let first = slot + half * LANES;
-        let here: [Pack; I] = std::array::from_fn(|c| unsafe { load(input[c], first) });
+        // SAFETY: the slots of a block are inside the input.
+        let here = unsafe { load_all(input, first) };
         let mut sum = [Pack::splat(0.0); O];
         let run = Run { view, words, half, first, input, here, kernel };
         // SAFETY of all four: groups are ranges of offsets.
@@ -184,20 +185,25 @@ impl<const D: usize, const I: usize, K> Run<'_, D, I, K> {
             let offset = self.view.families.offsets.get_unchecked(k);
             let mask = (*self.words.get_unchecked(k) >> (self.half * LANES)) as u8;
             let there_slot = self.first.wrapping_add_signed(offset.shift);
-            let there: [Pack; I] = std::array::from_fn(|c| load(self.input[c], there_slot));
+            let there = load_all(self.input, there_slot);
+            let mut xi = [Pack::splat(0.0); D];
+            for d in 0..D {
+                xi[d] = Pack::splat(offset.xi[d]);
+            }
             let bond = Bond {
-                xi: offset.xi.map(Pack::splat),
+                xi,
                 length: Pack::splat(offset.length),
                 weight: Pack::splat(*self.view.weights.get_unchecked(k)),
             };
-            let (value, stretch) = self.kernel.evaluate(&bond, self.here, there);
-            if mask == u8::MAX {
-                *watch = watch.max(stretch);
-                value
-            } else {
-                *watch = watch.max(stretch.keep(mask));
-                value.map(|v| v.keep(mask))
+            let (mut value, mut stretch) = self.kernel.evaluate(&bond, self.here, there);
+            if mask != u8::MAX {
+                stretch = stretch.keep(mask);
+                for v in &mut value {
+                    *v = v.keep(mask);
+                }
             }
+            *watch = watch.max(stretch);
+            value
         }
     }
 
@@ -211,14 +217,24 @@ impl<const D: usize, const I: usize, K> Run<'_, D, I, K> {
     }
 }
 
+// Plain loops from here to the law: the closures of `array::map` and `from_fn` are functions of their own, which the
+// compiler does not always inline into code for wider instructions.
+
 #[inline(always)]
-fn add<const O: usize>(a: [Pack; O], b: [Pack; O]) -> [Pack; O] {
-    std::array::from_fn(|c| a[c] + b[c])
+fn add<const O: usize>(mut a: [Pack; O], b: [Pack; O]) -> [Pack; O] {
+    for c in 0..O {
+        a[c] = a[c] + b[c];
+    }
+    a
 }
 
 #[inline(always)]
-unsafe fn load(field: &[f64], slot: usize) -> Pack {
-    Pack(unsafe { field.as_ptr().add(slot).cast::<[f64; LANES]>().read_unaligned() })
+unsafe fn load_all<const I: usize>(fields: [&[f64]; I], slot: usize) -> [Pack; I] {
+    let mut packs = [Pack::splat(0.0); I];
+    for c in 0..I {
+        packs[c] = Pack(unsafe { fields[c].as_ptr().add(slot).cast::<[f64; LANES]>().read_unaligned() });
+    }
+    packs
 }
 
 /// Asks each whole bond of a block whether it breaks, and clears its bit if so.

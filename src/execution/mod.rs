@@ -124,10 +124,9 @@ impl Exec {
             }
             _ => unreachable!("weights are built on the families of their body"),
         }
-        self.broken.iter().fold(Broken::default(), |sum, b| Broken {
-            bonds: sum.bonds + b.bonds,
-            energy: sum.energy + b.energy,
-        })
+        self.broken
+            .iter()
+            .fold(Broken::default(), |sum, b| Broken { bonds: sum.bonds + b.bonds, energy: sum.energy + b.energy })
     }
 
     /// Σ over 0..n of four numbers at a time, in chunks of fixed size added in order.

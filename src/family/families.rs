@@ -67,7 +67,9 @@ impl<const D: usize> Body<D> {
     /// `reach` and `accept` come from the partial-volume rule, which knows how far beyond δ a cell still matters.
     pub fn new(cloud: Cloud<D>, horizon: f64, reach: f64, accept: impl Fn(&Vector<D>) -> bool + Sync) -> Self {
         let families = match &cloud.arrangement {
-            Arrangement::Lattice(lattice) => Families::Lattice(LatticeFamilies::new(lattice, &cloud.slots, reach, accept)),
+            Arrangement::Lattice(lattice) => {
+                Families::Lattice(LatticeFamilies::new(lattice, &cloud.slots, reach, accept))
+            }
             Arrangement::Scattered { positions, .. } => Families::Cloud(search::families(positions, reach, accept)),
         };
         Body { cloud, families, horizon }

@@ -54,9 +54,7 @@ impl<const D: usize> Cells<D> {
     }
 
     fn cell(&self, x: &Vector<D>) -> [usize; D] {
-        std::array::from_fn(|d| {
-            (((x[d] - self.low[d]) / self.side).floor().max(0.0) as usize).min(self.counts[d] - 1)
-        })
+        std::array::from_fn(|d| (((x[d] - self.low[d]) / self.side).floor().max(0.0) as usize).min(self.counts[d] - 1))
     }
 
     fn index(&self, cell: [usize; D]) -> usize {
@@ -143,8 +141,7 @@ mod tests {
             let expected: Vec<u32> = (0..300u32)
                 .filter(|&j| j as usize != i && norm(&difference(&positions[j as usize], x)) <= 0.3)
                 .collect();
-            let row: Vec<u32> =
-                found.neighbours[found.of(i)].iter().copied().filter(|&j| j as usize != i).collect();
+            let row: Vec<u32> = found.neighbours[found.of(i)].iter().copied().filter(|&j| j as usize != i).collect();
             assert_eq!(row, expected);
         }
     }

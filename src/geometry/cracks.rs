@@ -30,8 +30,8 @@
 //! keep a bond through that edge, so let polygons overlap where the crack continues.
 
 use super::polygon::{
-    bounds_of, check_polygon, closest_on_segment, dimension, distance, doubles_back, edges, finite,
-    norm, orientation, polygon_side, positive,
+    bounds_of, check_polygon, closest_on_segment, dimension, distance, doubles_back, edges, finite, norm, orientation,
+    polygon_side, positive,
 };
 use crate::field::Vector;
 use robust::{Coord3D, orient3d};
@@ -77,16 +77,11 @@ impl<const D: usize> Crack<D> {
                 let bond = [[a[0], a[1], a[2]], [b[0], b[1], b[2]]];
                 polygon_cuts(vertices, bond, tolerance)
             }
-            Crack::Disc {
-                center,
-                normal,
-                radius,
-            } => {
+            Crack::Disc { center, normal, radius } => {
                 let bond = [[a[0], a[1], a[2]], [b[0], b[1], b[2]]];
                 let length = norm(normal);
                 let heights = bond.map(|x| dot(normal, &difference(&x, center)) / length);
-                crossing(bond, heights, tolerance)
-                    .is_some_and(|point| distance(&point, center) < radius - tolerance)
+                crossing(bond, heights, tolerance).is_some_and(|point| distance(&point, center) < radius - tolerance)
             }
         }
     }
@@ -108,11 +103,7 @@ impl<const D: usize> Crack<D> {
                 dimension("a polygon crack", D, &[3])?;
                 check_plane_polygon(vertices)
             }
-            Crack::Disc {
-                center,
-                normal,
-                radius,
-            } => {
+            Crack::Disc { center, normal, radius } => {
                 dimension("a disc crack", D, &[3])?;
                 finite("disc crack", center)?;
                 finite("disc crack's normal", normal)?;
@@ -137,20 +128,12 @@ impl<const D: usize> Crack<D> {
                 let (low, high) = bounds_of(vertices);
                 (from_fn(|k| low[k]), from_fn(|k| high[k]))
             }
-            Crack::Disc {
-                center,
-                normal,
-                radius,
-            } => {
+            Crack::Disc { center, normal, radius } => {
                 let length = norm(normal);
                 // √(1 - nₖ²) from the other two components, which does not cancel.
-                let reach: [f64; 3] = from_fn(|k| {
-                    radius * (normal[(k + 1) % 3] / length).hypot(normal[(k + 2) % 3] / length)
-                });
-                (
-                    from_fn(|k| center[k] - reach[k]),
-                    from_fn(|k| center[k] + reach[k]),
-                )
+                let reach: [f64; 3] =
+                    from_fn(|k| radius * (normal[(k + 1) % 3] / length).hypot(normal[(k + 2) % 3] / length));
+                (from_fn(|k| center[k] - reach[k]), from_fn(|k| center[k] + reach[k]))
             }
         }
     }
@@ -168,18 +151,13 @@ fn polyline_cuts(vertices: &[[f64; 2]], bond: [[f64; 2]; 2], tolerance: f64) -> 
             && !touches(bond, q, tolerance)
     };
     let cut_at = |before: [f64; 2], vertex: [f64; 2], after: [f64; 2]| {
-        touches(bond, vertex, tolerance)
-            && changes(&|x| left_of_corner(before, vertex, after, x, tolerance))
+        touches(bond, vertex, tolerance) && changes(&|x| left_of_corner(before, vertex, after, x, tolerance))
     };
 
     let count = vertices.len();
     let closed = vertices[0] == vertices[count - 1];
-    vertices
-        .windows(2)
-        .any(|edge| cut_between(edge[0], edge[1]))
-        || vertices
-            .windows(3)
-            .any(|corner| cut_at(corner[0], corner[1], corner[2]))
+    vertices.windows(2).any(|edge| cut_between(edge[0], edge[1]))
+        || vertices.windows(3).any(|corner| cut_at(corner[0], corner[1], corner[2]))
         || (closed && cut_at(vertices[count - 2], vertices[0], vertices[1]))
 }
 
@@ -190,27 +168,16 @@ fn left_of_line(p: [f64; 2], q: [f64; 2], x: [f64; 2], tolerance: f64) -> bool {
 
 /// Whether `x` is left of two edges that meet in a vertex, or on them: left of both where the path
 /// turns left, left of one where it turns right.
-fn left_of_corner(
-    before: [f64; 2],
-    vertex: [f64; 2],
-    after: [f64; 2],
-    x: [f64; 2],
-    tolerance: f64,
-) -> bool {
+fn left_of_corner(before: [f64; 2], vertex: [f64; 2], after: [f64; 2], x: [f64; 2], tolerance: f64) -> bool {
     let first = left_of_line(before, vertex, x, tolerance);
     let second = left_of_line(vertex, after, x, tolerance);
-    if orientation(before, vertex, after) > 0.0 {
-        first && second
-    } else {
-        first || second
-    }
+    if orientation(before, vertex, after) > 0.0 { first && second } else { first || second }
 }
 
 /// Whether a point lies on a bond: on its line, and in its bounding box.
 fn touches(bond: [[f64; 2]; 2], point: [f64; 2], tolerance: f64) -> bool {
     let [a, b] = bond;
-    let in_box = (0..2)
-        .all(|k| a[k].min(b[k]) - tolerance <= point[k] && point[k] <= a[k].max(b[k]) + tolerance);
+    let in_box = (0..2).all(|k| a[k].min(b[k]) - tolerance <= point[k] && point[k] <= a[k].max(b[k]) + tolerance);
     in_box && orientation(a, b, point).abs() <= tolerance * distance(&a, &b)
 }
 
@@ -219,9 +186,7 @@ fn polygon_cuts(vertices: &[[f64; 3]], bond: [[f64; 3]; 2], tolerance: f64) -> b
     let Some(point) = crossing(bond, bond.map(|x| plane.height(x)), tolerance) else {
         return false;
     };
-    let on_edge = |(p, q): ([f64; 3], [f64; 3])| {
-        distance(&point, &closest_on_segment(&p, &q, &point)) <= tolerance
-    };
+    let on_edge = |(p, q): ([f64; 3], [f64; 3])| distance(&point, &closest_on_segment(&p, &q, &point)) <= tolerance;
     let flat = edges(vertices).map(|(p, q)| (plane.flatten(p), plane.flatten(q)));
     polygon_side(flat, plane.flatten(point)) < 0.0 && !edges(vertices).any(on_edge)
 }
@@ -257,24 +222,14 @@ impl Plane {
         let normal = cross(&difference(&q, &p), &difference(&r, &p));
         // The three corners may run the other way round than the polygon.
         if dot(&normal, &area_vector(vertices)) < 0.0 {
-            return Plane {
-                corners: [p, r, q],
-                normal: normal.map(|n| -n),
-            };
+            return Plane { corners: [p, r, q], normal: normal.map(|n| -n) };
         }
-        Plane {
-            corners: [p, q, r],
-            normal,
-        }
+        Plane { corners: [p, q, r], normal }
     }
 
     /// Distance from the plane, positive on the positive side; the sign is exact.
     fn height(&self, x: [f64; 3]) -> f64 {
-        let coord = |p: [f64; 3]| Coord3D {
-            x: p[0],
-            y: p[1],
-            z: p[2],
-        };
+        let coord = |p: [f64; 3]| Coord3D { x: p[0], y: p[1], z: p[2] };
         let [p, q, r] = self.corners.map(coord);
         // `orient3d` is positive below the plane.
         -orient3d(p, q, r, coord(x)) / norm(&self.normal)
@@ -295,19 +250,13 @@ impl Plane {
 
 fn check_polyline(vertices: &[[f64; 2]]) -> Result<(), String> {
     if vertices.len() < 2 {
-        return Err(format!(
-            "the polyline crack has {} vertices, but needs at least 2",
-            vertices.len()
-        ));
+        return Err(format!("the polyline crack has {} vertices, but needs at least 2", vertices.len()));
     }
     for vertex in vertices {
         finite("polyline crack", vertex)?;
     }
     if let Some(i) = vertices.windows(2).position(|edge| edge[0] == edge[1]) {
-        return Err(format!(
-            "the polyline crack has vertex {i} twice in a row: {:?}",
-            vertices[i]
-        ));
+        return Err(format!("the polyline crack has vertex {i} twice in a row: {:?}", vertices[i]));
     }
     let last = vertices.len() - 1;
     if vertices[0] == vertices[last] && doubles_back(vertices[last - 1], vertices[0], vertices[1]) {
@@ -315,21 +264,14 @@ fn check_polyline(vertices: &[[f64; 2]]) -> Result<(), String> {
     }
     let back = |corner: &[[f64; 2]]| doubles_back(corner[0], corner[1], corner[2]);
     if let Some(i) = vertices.windows(3).position(back) {
-        return Err(format!(
-            "the polyline crack doubles back on itself at vertex {}: {:?}",
-            i + 1,
-            vertices[i + 1]
-        ));
+        return Err(format!("the polyline crack doubles back on itself at vertex {}: {:?}", i + 1, vertices[i + 1]));
     }
     Ok(())
 }
 
 fn check_plane_polygon(vertices: &[[f64; 3]]) -> Result<(), String> {
     if vertices.len() < 3 {
-        return Err(format!(
-            "the polygon crack has {} vertices, but needs at least 3",
-            vertices.len()
-        ));
+        return Err(format!("the polygon crack has {} vertices, but needs at least 3", vertices.len()));
     }
     for vertex in vertices {
         finite("polygon crack", vertex)?;
@@ -344,9 +286,7 @@ fn check_plane_polygon(vertices: &[[f64; 3]]) -> Result<(), String> {
     for (i, vertex) in vertices.iter().enumerate() {
         let height = plane.height(*vertex).abs();
         if height > 1e-9 * size {
-            return Err(format!(
-                "vertex {i} of the polygon crack lies {height:e} off the plane of the others"
-            ));
+            return Err(format!("vertex {i} of the polygon crack lies {height:e} off the plane of the others"));
         }
     }
     let flat: Vec<[f64; 2]> = vertices.iter().map(|v| plane.flatten(*v)).collect();
@@ -371,11 +311,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 }
 
 fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]
@@ -390,10 +326,7 @@ mod tests {
 
     impl Random {
         fn below(&mut self, limit: u64) -> Whole {
-            self.0 = self
-                .0
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             ((self.0 >> 33) % limit) as Whole
         }
 
@@ -452,11 +385,7 @@ mod tests {
             .map(|i| {
                 let v = float(vertices[i]);
                 let shift: [f64; 2] = if i == 0 || i == last {
-                    let (d, inward) = if i == 0 {
-                        (direction(0), 1e-3)
-                    } else {
-                        (direction(last - 1), -1e-3)
-                    };
+                    let (d, inward) = if i == 0 { (direction(0), 1e-3) } else { (direction(last - 1), -1e-3) };
                     from_fn(|k| offset(i.min(last - 1)) * right(d)[k] + inward * d[k])
                 } else {
                     let [n, m] = [i - 1, i].map(|edge| right(direction(edge)));
@@ -490,10 +419,8 @@ mod tests {
             let crack = Crack::<2>::Polyline(vertices.iter().map(|v| float(*v)).collect());
             for _ in 0..100 {
                 let (a, b) = (random.point::<2>(7), random.point::<2>(7));
-                let mut crossed: Vec<bool> = moved
-                    .windows(2)
-                    .map(|s| cross_properly(grid_unit(a), grid_unit(b), s[0], s[1]))
-                    .collect();
+                let mut crossed: Vec<bool> =
+                    moved.windows(2).map(|s| cross_properly(grid_unit(a), grid_unit(b), s[0], s[1])).collect();
                 for i in 1..vertices.len() - 1 {
                     // A corner that the bond only grazes: in on one edge, out on the next.
                     if on(a, b, vertices[i]) && crossed[i - 1] && crossed[i] {
@@ -634,12 +561,7 @@ mod tests {
         let at = |i: [i64; 3]| -> [f64; 3] { from_fn(|k| low[k] + (i[k] as f64 + 0.5) * h) };
         // Through the whole block, and as far as its middle; both start outside.
         let rectangle = |end: f64| {
-            let vertices = vec![
-                [-1.0, 0.0, -1.0],
-                [-1.0, 0.0, 1.0],
-                [end, 0.0, 1.0],
-                [end, 0.0, -1.0],
-            ];
+            let vertices = vec![[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [end, 0.0, 1.0], [end, 0.0, -1.0]];
             let crack = Crack::<3>::Polygon(vertices);
             crack.validate().unwrap();
             crack
@@ -707,9 +629,7 @@ mod tests {
                     let big: Vec<[Whole; 2]> = flat.iter().map(|p| p.map(|x| x * scale)).collect();
                     let on_edge = edges(&big).any(|(p, q)| on(p, q, c));
                     let crossings = edges(&big)
-                        .filter(|(p, q)| {
-                            (p[1] > c[1]) != (q[1] > c[1]) && (turn(*p, *q, c) > 0) == (q[1] > p[1])
-                        })
+                        .filter(|(p, q)| (p[1] > c[1]) != (q[1] > c[1]) && (turn(*p, *q, c) > 0) == (q[1] > p[1]))
                         .count();
                     kept_on_edge += usize::from(on_edge);
                     !on_edge && crossings % 2 == 1
@@ -727,11 +647,7 @@ mod tests {
 
     #[test]
     fn discs_cut_inside_their_radius_and_keep_at_their_rim() {
-        let disc = Crack::<3>::Disc {
-            center: [0.0, 0.0, 1.0],
-            normal: [0.0, 0.0, 2.0],
-            radius: 5.0,
-        };
+        let disc = Crack::<3>::Disc { center: [0.0, 0.0, 1.0], normal: [0.0, 0.0, 2.0], radius: 5.0 };
         disc.validate().unwrap();
         let cuts = |a: [f64; 3], b: [f64; 3]| {
             assert_eq!(disc.cuts(&a, &b, 1e-9), disc.cuts(&b, &a, 1e-9));
@@ -762,11 +678,7 @@ mod tests {
     #[test]
     fn bonds_outside_the_bounds_are_not_cut() {
         let normal = [1.0, 2.0, -0.5];
-        let disc = Crack::<3>::Disc {
-            center: [3.0; 3],
-            normal,
-            radius: 2.0,
-        };
+        let disc = Crack::<3>::Disc { center: [3.0; 3], normal, radius: 2.0 };
         let (low, high) = disc.bounds();
         let mut random = Random(4);
         let mut cut = 0;
@@ -803,32 +715,14 @@ mod tests {
         };
         let line = [[0.0; 3], [1.0; 3], [2.0; 3]];
         assert!(polygon(&line).contains("on one line"));
-        let bent = [
-            [0.0, 0.0, 0.0],
-            [1.0, 0.0, 0.0],
-            [1.0, 1.0, 0.1],
-            [0.0, 1.0, 0.0],
-        ];
+        let bent = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.1], [0.0, 1.0, 0.0]];
         assert!(polygon(&bent).contains("off the plane"));
-        let bow_tie = [
-            [0.0, 0.0, 0.0],
-            [1.0, 0.0, 1.0],
-            [1.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0],
-        ];
+        let bow_tie = [[0.0, 0.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         assert!(polygon(&bow_tie).contains("intersects itself"));
 
-        let flat = Crack::<2>::Disc {
-            center: [0.0; 3],
-            normal: [0.0; 3],
-            radius: 1.0,
-        };
+        let flat = Crack::<2>::Disc { center: [0.0; 3], normal: [0.0; 3], radius: 1.0 };
         assert!(flat.validate().unwrap_err().contains("3 dimensions"));
-        let no_normal = Crack::<3>::Disc {
-            center: [0.0; 3],
-            normal: [0.0; 3],
-            radius: 1.0,
-        };
+        let no_normal = Crack::<3>::Disc { center: [0.0; 3], normal: [0.0; 3], radius: 1.0 };
         assert!(no_normal.validate().unwrap_err().contains("normal"));
     }
 }

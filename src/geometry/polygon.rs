@@ -27,9 +27,7 @@ pub(super) fn polygon_side(edges: impl Iterator<Item = ([f64; 2], [f64; 2])>, x:
 pub(super) fn check_polygon(vertices: &[[f64; 2]]) -> Result<(), String> {
     let count = vertices.len();
     if count < 3 {
-        return Err(format!(
-            "the polygon has {count} vertices, but needs at least 3"
-        ));
+        return Err(format!("the polygon has {count} vertices, but needs at least 3"));
     }
     for vertex in vertices {
         finite("polygon", vertex)?;
@@ -40,10 +38,7 @@ pub(super) fn check_polygon(vertices: &[[f64; 2]]) -> Result<(), String> {
             return Err(format!("the polygon has vertex {i} twice in a row"));
         }
         if doubles_back(a, b, all[(i + 1) % count].1) {
-            return Err(format!(
-                "the polygon doubles back on itself at vertex {}",
-                (i + 1) % count
-            ));
+            return Err(format!("the polygon doubles back on itself at vertex {}", (i + 1) % count));
         }
         for (j, &(c, d)) in all.iter().enumerate().skip(i + 2) {
             let adjacent = (j + 1) % count == i;
@@ -60,8 +55,7 @@ pub(super) fn check_polygon(vertices: &[[f64; 2]]) -> Result<(), String> {
 
 /// Whether the path from `a` over `b` to `c` returns along the line that it came.
 pub(super) fn doubles_back(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> bool {
-    orientation(a, b, c) == 0.0
-        && (0..2).any(|k| (b[k] > a[k] && c[k] < b[k]) || (b[k] < a[k] && c[k] > b[k]))
+    orientation(a, b, c) == 0.0 && (0..2).any(|k| (b[k] > a[k] && c[k] < b[k]) || (b[k] < a[k] && c[k] > b[k]))
 }
 
 fn segments_meet(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
@@ -91,11 +85,7 @@ pub(super) fn edges<P: Copy>(vertices: &[P]) -> impl Iterator<Item = (P, P)> {
     vertices.iter().zip(next).map(|(&a, &b)| (a, b))
 }
 
-pub(super) fn closest_on_segment<const N: usize>(
-    a: &[f64; N],
-    b: &[f64; N],
-    x: &[f64; N],
-) -> [f64; N] {
+pub(super) fn closest_on_segment<const N: usize>(a: &[f64; N], b: &[f64; N], x: &[f64; N]) -> [f64; N] {
     let (mut along, mut square) = (0.0, 0.0);
     for k in 0..N {
         along += (x[k] - a[k]) * (b[k] - a[k]);
@@ -115,24 +105,16 @@ pub(super) fn signed_area(vertices: &[[f64; 2]]) -> f64 {
     // Relative to a vertex: a polygon far from the origin loses no digits.
     let origin = vertices[0];
     let doubled: f64 = edges(vertices)
-        .map(|(a, b)| {
-            (a[0] - origin[0]) * (b[1] - origin[1]) - (a[1] - origin[1]) * (b[0] - origin[0])
-        })
+        .map(|(a, b)| (a[0] - origin[0]) * (b[1] - origin[1]) - (a[1] - origin[1]) * (b[0] - origin[0]))
         .sum();
     0.5 * doubled
 }
 
 /// Smallest and largest coordinates of points.
 pub(super) fn bounds_of<const N: usize>(points: &[[f64; N]]) -> ([f64; N], [f64; N]) {
-    points.iter().fold(
-        ([f64::INFINITY; N], [f64::NEG_INFINITY; N]),
-        |(low, high), point| {
-            (
-                from_fn(|k| low[k].min(point[k])),
-                from_fn(|k| high[k].max(point[k])),
-            )
-        },
-    )
+    points.iter().fold(([f64::INFINITY; N], [f64::NEG_INFINITY; N]), |(low, high), point| {
+        (from_fn(|k| low[k].min(point[k])), from_fn(|k| high[k].max(point[k])))
+    })
 }
 
 pub(super) fn norm<const N: usize>(v: &[f64; N]) -> f64 {
@@ -148,9 +130,7 @@ pub(super) fn finite<const N: usize>(what: &str, point: &[f64; N]) -> Result<(),
     if point.iter().all(|c| c.is_finite()) {
         return Ok(());
     }
-    Err(format!(
-        "a point of the {what} is {point:?}, but coordinates must be finite"
-    ))
+    Err(format!("a point of the {what} is {point:?}, but coordinates must be finite"))
 }
 
 /// Whether `what` exists in `d` dimensions.
@@ -159,10 +139,7 @@ pub(super) fn dimension(what: &str, d: usize, allowed: &[usize]) -> Result<(), S
         return Ok(());
     }
     let allowed: Vec<String> = allowed.iter().map(usize::to_string).collect();
-    Err(format!(
-        "{what} exists in {} dimensions, but the problem has {d}",
-        allowed.join(" or ")
-    ))
+    Err(format!("{what} exists in {} dimensions, but the problem has {d}", allowed.join(" or ")))
 }
 
 pub(super) fn positive(what: &str, value: f64) -> Result<(), String> {

@@ -14,8 +14,8 @@
 //! Absent on purpose: rotated boxes and cylinders, meshes, smooth blends.
 
 use super::polygon::{
-    bounds_of, check_polygon, closest_on_segment, dimension, distance, edges, finite, norm,
-    polygon_side, positive, signed_area,
+    bounds_of, check_polygon, closest_on_segment, dimension, distance, edges, finite, norm, polygon_side, positive,
+    signed_area,
 };
 use crate::field::Vector;
 use std::array::from_fn;
@@ -91,8 +91,7 @@ impl<const D: usize> Shape<D> {
         match self {
             Shape::Box { low, high } => {
                 for k in 0..D {
-                    interval("box", low[k], high[k])
-                        .map_err(|message| format!("{message} (axis {k})"))?;
+                    interval("box", low[k], high[k]).map_err(|message| format!("{message} (axis {k})"))?;
                 }
                 Ok(())
             }
@@ -100,30 +99,18 @@ impl<const D: usize> Shape<D> {
                 finite("ball", center)?;
                 positive("radius of the ball", *radius)
             }
-            Shape::Ring {
-                center,
-                inner,
-                outer,
-            } => {
+            Shape::Ring { center, inner, outer } => {
                 dimension("a ring", D, &[2, 3])?;
                 finite("ring", center)?;
                 positive("inner radius of the ring", *inner)?;
                 positive("outer radius of the ring", *outer)?;
                 hollow("ring", *inner, *outer)
             }
-            Shape::Cylinder {
-                center,
-                axis,
-                radius,
-                inner,
-                length,
-            } => {
+            Shape::Cylinder { center, axis, radius, inner, length } => {
                 dimension("a cylinder", D, &[3])?;
                 finite("cylinder", center)?;
                 if *axis >= D {
-                    return Err(format!(
-                        "the axis of the cylinder is {axis}, but must be 0, 1 or 2"
-                    ));
+                    return Err(format!("the axis of the cylinder is {axis}, but must be 0, 1 or 2"));
                 }
                 positive("radius of the cylinder", *radius)?;
                 positive("length of the cylinder", *length)?;
@@ -136,19 +123,14 @@ impl<const D: usize> Shape<D> {
                 dimension("a polygon", D, &[2])?;
                 check_polygon(vertices)
             }
-            Shape::Extrusion {
-                vertices,
-                low,
-                high,
-            } => {
+            Shape::Extrusion { vertices, low, high } => {
                 dimension("an extrusion", D, &[3])?;
                 interval("extrusion", *low, *high)?;
                 check_polygon(vertices)
             }
             Shape::Union(members) => check_members("union", members),
             Shape::Difference(base, cutters) => {
-                base.validate()
-                    .map_err(|message| format!("shape to cut from: {message}"))?;
+                base.validate().map_err(|message| format!("shape to cut from: {message}"))?;
                 if cutters.is_empty() {
                     return Ok(());
                 }
@@ -184,14 +166,10 @@ impl<const D: usize> Shape<D> {
         let distance = |shape: &Shape<D>| shape.signed_distance(x);
         match self {
             Shape::Union(members) => members.iter().map(distance).fold(f64::INFINITY, f64::min),
-            Shape::Intersection(members) => members
-                .iter()
-                .map(distance)
-                .fold(f64::NEG_INFINITY, f64::max),
-            Shape::Difference(base, cutters) => cutters
-                .iter()
-                .map(distance)
-                .fold(distance(base), |d, cutter| d.max(-cutter)),
+            Shape::Intersection(members) => members.iter().map(distance).fold(f64::NEG_INFINITY, f64::max),
+            Shape::Difference(base, cutters) => {
+                cutters.iter().map(distance).fold(distance(base), |d, cutter| d.max(-cutter))
+            }
             primitive => primitive.nearest(x).distance,
         }
     }
@@ -217,59 +195,37 @@ impl<const D: usize> Shape<D> {
     ///
     /// Tight for primitives and unions.
     pub fn bounds(&self) -> (Vector<D>, Vector<D>) {
-        let around =
-            |center: &Vector<D>, reach: f64| (center.map(|c| c - reach), center.map(|c| c + reach));
+        let around = |center: &Vector<D>, reach: f64| (center.map(|c| c - reach), center.map(|c| c + reach));
         match self {
             Shape::Box { low, high } => (*low, *high),
             Shape::Ball { center, radius } => around(center, *radius),
             Shape::Ring { center, outer, .. } => around(center, *outer),
-            Shape::Cylinder {
-                center,
-                axis,
-                radius,
-                length,
-                ..
-            } => {
+            Shape::Cylinder { center, axis, radius, length, .. } => {
                 let reach: Vector<D> = from_fn(|k| if k == *axis { 0.5 * length } else { *radius });
-                (
-                    from_fn(|k| center[k] - reach[k]),
-                    from_fn(|k| center[k] + reach[k]),
-                )
+                (from_fn(|k| center[k] - reach[k]), from_fn(|k| center[k] + reach[k]))
             }
             Shape::Polygon { vertices } => {
                 let (low, high) = bounds_of(vertices);
                 (from_fn(|k| low[k]), from_fn(|k| high[k]))
             }
-            Shape::Extrusion {
-                vertices,
-                low: bottom,
-                high: top,
-            } => {
+            Shape::Extrusion { vertices, low: bottom, high: top } => {
                 let (low, high) = bounds_of(vertices);
                 let (low, high) = ([low[0], low[1], *bottom], [high[0], high[1], *top]);
                 (from_fn(|k| low[k]), from_fn(|k| high[k]))
             }
-            Shape::Union(members) => members.iter().fold(
-                ([f64::INFINITY; D], [f64::NEG_INFINITY; D]),
-                |(low, high), member| {
+            Shape::Union(members) => {
+                members.iter().fold(([f64::INFINITY; D], [f64::NEG_INFINITY; D]), |(low, high), member| {
                     let (l, h) = member.bounds();
-                    (
-                        from_fn(|k| low[k].min(l[k])),
-                        from_fn(|k| high[k].max(h[k])),
-                    )
-                },
-            ),
+                    (from_fn(|k| low[k].min(l[k])), from_fn(|k| high[k].max(h[k])))
+                })
+            }
             Shape::Difference(base, _) => base.bounds(),
-            Shape::Intersection(members) => members.iter().fold(
-                ([f64::NEG_INFINITY; D], [f64::INFINITY; D]),
-                |(low, high), member| {
+            Shape::Intersection(members) => {
+                members.iter().fold(([f64::NEG_INFINITY; D], [f64::INFINITY; D]), |(low, high), member| {
                     let (l, h) = member.bounds();
-                    (
-                        from_fn(|k| low[k].max(l[k])),
-                        from_fn(|k| high[k].min(h[k])),
-                    )
-                },
-            ),
+                    (from_fn(|k| low[k].max(l[k])), from_fn(|k| high[k].min(h[k])))
+                })
+            }
         }
     }
 
@@ -284,18 +240,9 @@ impl<const D: usize> Shape<D> {
             Shape::Box { low, high } => Some((0..D).map(|k| high[k] - low[k]).product()),
             Shape::Ball { radius, .. } => Some(ball(*radius)),
             Shape::Ring { inner, outer, .. } => Some(ball(*outer) - ball(*inner)),
-            Shape::Cylinder {
-                radius,
-                inner,
-                length,
-                ..
-            } => Some(PI * (radius.powi(2) - inner.powi(2)) * length),
+            Shape::Cylinder { radius, inner, length, .. } => Some(PI * (radius.powi(2) - inner.powi(2)) * length),
             Shape::Polygon { vertices } => Some(signed_area(vertices).abs()),
-            Shape::Extrusion {
-                vertices,
-                low,
-                high,
-            } => Some(signed_area(vertices).abs() * (high - low)),
+            Shape::Extrusion { vertices, low, high } => Some(signed_area(vertices).abs() * (high - low)),
             Shape::Union(_) | Shape::Difference(..) | Shape::Intersection(_) => None,
         }
     }
@@ -311,21 +258,9 @@ impl<const D: usize> Shape<D> {
                     normal: from_fn(|k| share[k] * factors[k].normal[0]),
                 }
             }
-            Shape::Ball { center, radius } => {
-                shell(x, from_fn(|k| x[k] - center[k]), 0.0, *radius, 0)
-            }
-            Shape::Ring {
-                center,
-                inner,
-                outer,
-            } => shell(x, from_fn(|k| x[k] - center[k]), *inner, *outer, 0),
-            Shape::Cylinder {
-                center,
-                axis,
-                radius,
-                inner,
-                length,
-            } => {
+            Shape::Ball { center, radius } => shell(x, from_fn(|k| x[k] - center[k]), 0.0, *radius, 0),
+            Shape::Ring { center, inner, outer } => shell(x, from_fn(|k| x[k] - center[k]), *inner, *outer, 0),
+            Shape::Cylinder { center, axis, radius, inner, length } => {
                 let mut across: Vector<D> = from_fn(|k| x[k] - center[k]);
                 across[*axis] = 0.0;
                 let round = shell(x, across, *inner, *radius, (axis + 1) % D);
@@ -341,11 +276,7 @@ impl<const D: usize> Shape<D> {
                     normal: from_fn(|k| flat.normal[k]),
                 }
             }
-            Shape::Extrusion {
-                vertices,
-                low,
-                high,
-            } => {
+            Shape::Extrusion { vertices, low, high } => {
                 let flat = nearest_on_polygon(vertices, [x[0], x[1]]);
                 let side = Nearest {
                     distance: flat.distance,
@@ -354,9 +285,7 @@ impl<const D: usize> Shape<D> {
                 };
                 join(x, 2, &side, &end_of(*low, *high, x[2]))
             }
-            Shape::Union(_) | Shape::Difference(..) | Shape::Intersection(_) => {
-                self.nearest_of_members(x)
-            }
+            Shape::Union(_) | Shape::Difference(..) | Shape::Intersection(_) => self.nearest_of_members(x),
         }
     }
 
@@ -381,10 +310,7 @@ impl<const D: usize> Shape<D> {
                 off(a).cmp(&off(b)).then(far(a).total_cmp(&far(b)))
             })
             .expect("the walk is always a candidate");
-        Nearest {
-            distance: self.signed_distance(x),
-            ..best
-        }
+        Nearest { distance: self.signed_distance(x), ..best }
     }
 
     /// Closest points of all primitives; `sign` is -1 where the primitive is cut away.
@@ -422,8 +348,7 @@ impl<const D: usize> Shape<D> {
 
     /// Closest point of the primitive whose distance is the combined signed distance at `x`.
     fn deciding(&self, x: &Vector<D>, sign: f64) -> Nearest<D> {
-        let by_distance =
-            |a: &&Shape<D>, b: &&Shape<D>| a.signed_distance(x).total_cmp(&b.signed_distance(x));
+        let by_distance = |a: &&Shape<D>, b: &&Shape<D>| a.signed_distance(x).total_cmp(&b.signed_distance(x));
         let expected = "checked by `validate`: at least one member";
         match self {
             Shape::Union(members) => {
@@ -435,9 +360,7 @@ impl<const D: usize> Shape<D> {
                 member.deciding(x, sign)
             }
             Shape::Difference(base, cutters) => match cutters.iter().min_by(by_distance) {
-                Some(cutter) if -cutter.signed_distance(x) > base.signed_distance(x) => {
-                    cutter.deciding(x, -sign)
-                }
+                Some(cutter) if -cutter.signed_distance(x) > base.signed_distance(x) => cutter.deciding(x, -sign),
                 _ => base.deciding(x, sign),
             },
             primitive => primitive.nearest(x).facing(sign),
@@ -482,22 +405,13 @@ fn product<const N: usize>(distances: [f64; N]) -> (f64, [f64; N]) {
 }
 
 /// Product of a shape across `axis` with an interval along it.
-fn join<const D: usize>(
-    x: &Vector<D>,
-    axis: usize,
-    across: &Nearest<D>,
-    along: &Nearest<1>,
-) -> Nearest<D> {
+fn join<const D: usize>(x: &Vector<D>, axis: usize, across: &Nearest<D>, along: &Nearest<1>) -> Nearest<D> {
     let (distance, share) = product([across.distance, along.distance]);
     let mut point = from_fn(|k| pick(share[0], across.point[k], x[k]));
     let mut normal = across.normal.map(|n| share[0] * n);
     point[axis] = pick(share[1], along.point[0], x[axis]);
     normal[axis] = share[1] * along.normal[0];
-    Nearest {
-        distance,
-        point,
-        normal,
-    }
+    Nearest { distance, point, normal }
 }
 
 /// Coordinate of the closest point: the factor's own where it takes part, else that of the query.
@@ -508,34 +422,17 @@ fn pick(share: f64, closest: f64, own: f64) -> f64 {
 /// Closest end of an interval.
 fn end_of(low: f64, high: f64, x: f64) -> Nearest<1> {
     let (below, above) = (low - x, x - high);
-    let (distance, point, normal) = if below > above {
-        (below, low, -1.0)
-    } else {
-        (above, high, 1.0)
-    };
-    Nearest {
-        distance,
-        point: [point],
-        normal: [normal],
-    }
+    let (distance, point, normal) = if below > above { (below, low, -1.0) } else { (above, high, 1.0) };
+    Nearest { distance, point: [point], normal: [normal] }
 }
 
 /// Closest point of the shell `inner <= |offset| <= outer`, solid for `inner` zero.
 ///
 /// In the middle, where all directions are equally close, it is `axis`.
-fn shell<const D: usize>(
-    x: &Vector<D>,
-    offset: Vector<D>,
-    inner: f64,
-    outer: f64,
-    axis: usize,
-) -> Nearest<D> {
+fn shell<const D: usize>(x: &Vector<D>, offset: Vector<D>, inner: f64, outer: f64, axis: usize) -> Nearest<D> {
     let length = norm(&offset);
-    let direction = if length > 0.0 {
-        offset.map(|c| c / length)
-    } else {
-        from_fn(|k| if k == axis { 1.0 } else { 0.0 })
-    };
+    let direction =
+        if length > 0.0 { offset.map(|c| c / length) } else { from_fn(|k| if k == axis { 1.0 } else { 0.0 }) };
     let (distance, radius, sign) = if inner > 0.0 && inner - length > length - outer {
         (inner - length, inner, -1.0)
     } else {
@@ -586,11 +483,7 @@ fn nearest_on_polygon(vertices: &[[f64; 2]], x: [f64; 2]) -> Nearest<2> {
     };
     Nearest {
         // The exact side wins over a distance that was rounded to zero.
-        distance: if side == 0.0 {
-            0.0
-        } else {
-            side * length.max(f64::MIN_POSITIVE)
-        },
+        distance: if side == 0.0 { 0.0 } else { side * length.max(f64::MIN_POSITIVE) },
         point,
         normal,
     }
@@ -600,18 +493,14 @@ fn interval(what: &str, low: f64, high: f64) -> Result<(), String> {
     if low.is_finite() && high.is_finite() && low < high {
         return Ok(());
     }
-    Err(format!(
-        "the {what} reaches from {low} to {high}, but the first must be smaller and both finite"
-    ))
+    Err(format!("the {what} reaches from {low} to {high}, but the first must be smaller and both finite"))
 }
 
 fn hollow(what: &str, inner: f64, outer: f64) -> Result<(), String> {
     if inner < outer {
         return Ok(());
     }
-    Err(format!(
-        "the inner radius of the {what} is {inner}, but must be smaller than the outer, {outer}"
-    ))
+    Err(format!("the inner radius of the {what} is {inner}, but must be smaller than the outer, {outer}"))
 }
 
 fn check_members<const D: usize>(what: &str, members: &[Shape<D>]) -> Result<(), String> {
@@ -619,9 +508,7 @@ fn check_members<const D: usize>(what: &str, members: &[Shape<D>]) -> Result<(),
         return Err(format!("the {what} has no members"));
     }
     for (i, member) in members.iter().enumerate() {
-        member
-            .validate()
-            .map_err(|message| format!("member {i} of the {what}: {message}"))?;
+        member.validate().map_err(|message| format!("member {i} of the {what}: {message}"))?;
     }
     Ok(())
 }
@@ -635,10 +522,7 @@ mod tests {
 
     impl Random {
         fn next(&mut self) -> f64 {
-            self.0 = self
-                .0
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (self.0 >> 11) as f64 / (1u64 << 53) as f64
         }
 
@@ -661,103 +545,44 @@ mod tests {
 
     /// An L with one slanted edge, clockwise.
     fn bracket() -> Vec<[f64; 2]> {
-        let mut vertices = vec![
-            [0.0, 0.0],
-            [3.0, 0.2],
-            [3.0, 1.0],
-            [1.0, 1.0],
-            [1.0, 2.0],
-            [0.0, 2.0],
-        ];
+        let mut vertices = vec![[0.0, 0.0], [3.0, 0.2], [3.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
         vertices.reverse();
         vertices
     }
 
     fn segments() -> Vec<Shape<1>> {
-        vec![
-            Shape::Box {
-                low: [-0.3],
-                high: [1.1],
-            },
-            Shape::Ball {
-                center: [0.4],
-                radius: 0.7,
-            },
-        ]
+        vec![Shape::Box { low: [-0.3], high: [1.1] }, Shape::Ball { center: [0.4], radius: 0.7 }]
     }
 
     fn flat() -> Vec<Shape<2>> {
         vec![
-            Shape::Box {
-                low: [-1.0, 0.5],
-                high: [2.0, 1.4],
-            },
-            Shape::Ball {
-                center: [0.3, -0.2],
-                radius: 1.3,
-            },
-            Shape::Ring {
-                center: [0.3, -0.2],
-                inner: 0.6,
-                outer: 1.3,
-            },
-            Shape::Polygon {
-                vertices: bracket(),
-            },
+            Shape::Box { low: [-1.0, 0.5], high: [2.0, 1.4] },
+            Shape::Ball { center: [0.3, -0.2], radius: 1.3 },
+            Shape::Ring { center: [0.3, -0.2], inner: 0.6, outer: 1.3 },
+            Shape::Polygon { vertices: bracket() },
         ]
     }
 
     fn solid() -> Vec<Shape<3>> {
         let mut shapes = vec![
-            Shape::Box {
-                low: [-1.0, 0.5, 0.0],
-                high: [2.0, 1.4, 1.0],
-            },
-            Shape::Ball {
-                center: [0.3, -0.2, 0.1],
-                radius: 1.3,
-            },
-            Shape::Ring {
-                center: [0.3, -0.2, 0.1],
-                inner: 0.6,
-                outer: 1.3,
-            },
-            Shape::Extrusion {
-                vertices: bracket(),
-                low: -0.4,
-                high: 0.5,
-            },
+            Shape::Box { low: [-1.0, 0.5, 0.0], high: [2.0, 1.4, 1.0] },
+            Shape::Ball { center: [0.3, -0.2, 0.1], radius: 1.3 },
+            Shape::Ring { center: [0.3, -0.2, 0.1], inner: 0.6, outer: 1.3 },
+            Shape::Extrusion { vertices: bracket(), low: -0.4, high: 0.5 },
         ];
         for axis in 0..3 {
             for inner in [0.0, 0.5] {
-                shapes.push(Shape::Cylinder {
-                    center: [0.3, -0.2, 0.1],
-                    axis,
-                    radius: 0.9,
-                    inner,
-                    length: 1.7,
-                });
+                shapes.push(Shape::Cylinder { center: [0.3, -0.2, 0.1], axis, radius: 0.9, inner, length: 1.7 });
             }
         }
         shapes
     }
 
     fn plates() -> Vec<Shape<2>> {
-        let plate = Shape::Box {
-            low: [-1.0, -1.0],
-            high: [1.0, 1.0],
-        };
-        let hole = Shape::Ball {
-            center: [0.2, 0.1],
-            radius: 0.4,
-        };
-        let notch = Shape::Polygon {
-            vertices: vec![[-1.5, -0.5], [-0.6, -0.4], [-1.5, -0.3]],
-        };
-        let beside = Shape::Box {
-            low: [0.5, 0.5],
-            high: [2.0, 1.5],
-        };
+        let plate = Shape::Box { low: [-1.0, -1.0], high: [1.0, 1.0] };
+        let hole = Shape::Ball { center: [0.2, 0.1], radius: 0.4 };
+        let notch = Shape::Polygon { vertices: vec![[-1.5, -0.5], [-0.6, -0.4], [-1.5, -0.3]] };
+        let beside = Shape::Box { low: [0.5, 0.5], high: [2.0, 1.5] };
         vec![
             Shape::Difference(std::boxed::Box::new(plate.clone()), vec![hole, notch]),
             Shape::Union(vec![plate.clone(), beside.clone()]),
@@ -800,10 +625,7 @@ mod tests {
                 let d = shape.signed_distance(&x);
                 let point = shape.closest_point(&x);
                 assert!(d.abs() <= distance(&x, &point) + 1e-9);
-                assert!(
-                    shape.signed_distance(&point).abs() < 1e-8,
-                    "{shape:?} {x:?}"
-                );
+                assert!(shape.signed_distance(&point).abs() < 1e-8, "{shape:?} {x:?}");
                 for _ in 0..20 {
                     let y = random.within(&x, d.abs());
                     assert_eq!(shape.contains(&y), d <= 0.0, "{shape:?} {x:?} {y:?}");
@@ -833,10 +655,7 @@ mod tests {
                         continue;
                     }
                     checked += 1;
-                    assert!(
-                        distance(&gradient, &shape.normal(&x)) < 1e-6,
-                        "{shape:?} {x:?}"
-                    );
+                    assert!(distance(&gradient, &shape.normal(&x)) < 1e-6, "{shape:?} {x:?}");
                 }
                 assert!(checked > 290);
             }
@@ -964,40 +783,15 @@ mod tests {
         let pinched = [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [2.0, 0.0], [0.0, 2.0]];
         assert!(polygon(&pinched).contains("intersects itself"));
 
-        let ball = Shape::Ball {
-            center: [0.0],
-            radius: -1.0,
-        };
-        assert!(
-            ball.validate()
-                .unwrap_err()
-                .contains("radius of the ball is -1")
-        );
-        let ring = Shape::Ring {
-            center: [0.0],
-            inner: 1.0,
-            outer: 2.0,
-        };
+        let ball = Shape::Ball { center: [0.0], radius: -1.0 };
+        assert!(ball.validate().unwrap_err().contains("radius of the ball is -1"));
+        let ring = Shape::Ring { center: [0.0], inner: 1.0, outer: 2.0 };
         assert!(ring.validate().unwrap_err().contains("2 or 3 dimensions"));
-        let ring = Shape::Ring {
-            center: [0.0; 2],
-            inner: 2.0,
-            outer: 2.0,
-        };
-        assert!(
-            ring.validate()
-                .unwrap_err()
-                .contains("smaller than the outer")
-        );
-        let nan = Shape::Box {
-            low: [f64::NAN],
-            high: [1.0],
-        };
+        let ring = Shape::Ring { center: [0.0; 2], inner: 2.0, outer: 2.0 };
+        assert!(ring.validate().unwrap_err().contains("smaller than the outer"));
+        let nan = Shape::Box { low: [f64::NAN], high: [1.0] };
         assert!(nan.validate().is_err());
-        let apart = [0.0, 5.0].map(|x| Shape::Ball {
-            center: [x],
-            radius: 1.0,
-        });
+        let apart = [0.0, 5.0].map(|x| Shape::Ball { center: [x], radius: 1.0 });
         let apart = Shape::Intersection(apart.to_vec());
         assert!(apart.validate().unwrap_err().contains("do not overlap"));
         assert!(Shape::<2>::Union(vec![]).validate().is_err());

@@ -1,8 +1,6 @@
 //! What surrounds the data in pictures and plots: axes with ticks, the colour bar, the heading.
 
-use super::canvas::{
-    Align, Area, BLACK, Color, GREY, Image, Lettering, PALE, shortened, text_width, wrapped,
-};
+use super::canvas::{Align, Area, BLACK, Color, GREY, Image, Lettering, PALE, shortened, text_width, wrapped};
 use super::ticks::{Axis, Ticks};
 
 /// Sizes of everything that is not data, in pixels, in proportion to the picture.
@@ -15,9 +13,7 @@ impl Measure {
     /// For a picture of this width. At 1000 pixels the unit is one; below, letters
     /// shrink less than the picture, to stay readable.
     pub fn new(width: f64) -> Self {
-        Self {
-            unit: 0.35 + 0.65e-3 * width,
-        }
+        Self { unit: 0.35 + 0.65e-3 * width }
     }
 
     pub fn title(self) -> f64 {
@@ -61,20 +57,12 @@ impl Measure {
     }
 
     pub fn lettering(self, size: f64, align: Align) -> Lettering {
-        Lettering {
-            size,
-            color: BLACK,
-            align,
-        }
+        Lettering { size, color: BLACK, align }
     }
 }
 
 fn widest(ticks: &Ticks, size: f64) -> f64 {
-    ticks
-        .labels
-        .iter()
-        .map(|(_, label)| text_width(label, size))
-        .fold(0.0, f64::max)
+    ticks.labels.iter().map(|(_, label)| text_width(label, size)).fold(0.0, f64::max)
 }
 
 /// How many labels fit beside an axis of this length without crowding.
@@ -125,12 +113,7 @@ pub(super) fn draw_axes(image: &mut Image, area: Area, x: &Side, y: &Side, measu
     let half = 0.5 * measure.hairline();
     let height_of = |value: f64| (area.bottom - y.axis.share(value) * area.height()).round();
     let mut mark = |at: f64, length: f64| {
-        let tick = Area {
-            left: area.left - length,
-            top: at - half,
-            right: area.left,
-            bottom: at + half,
-        };
+        let tick = Area { left: area.left - length, top: at - half, right: area.left, bottom: at + half };
         image.fill(tick, BLACK);
     };
     for value in &y.ticks.minor {
@@ -153,12 +136,7 @@ fn draw_lower_axis(image: &mut Image, area: Area, x: &Side, measure: Measure) {
     let half = 0.5 * measure.hairline();
     let column_of = |value: f64| (area.left + x.axis.share(value) * area.width()).round();
     let mut mark = |at: f64, length: f64| {
-        let tick = Area {
-            left: at - half,
-            top: area.bottom,
-            right: at + half,
-            bottom: area.bottom + length,
-        };
+        let tick = Area { left: at - half, top: area.bottom, right: at + half, bottom: area.bottom + length };
         image.fill(tick, BLACK);
     };
     for value in &x.ticks.minor {
@@ -176,11 +154,7 @@ fn draw_lower_axis(image: &mut Image, area: Area, x: &Side, measure: Measure) {
     let row = area.bottom + measure.below_axis() - 0.5 * measure.label();
     let label = shortened(&x.label, measure.label(), image.width as f64);
     let half_width = 0.5 * text_width(&label, measure.label());
-    let centre = kept_inside(
-        0.5 * (area.left + area.right),
-        half_width,
-        image.width as f64,
-    );
+    let centre = kept_inside(0.5 * (area.left + area.right), half_width, image.width as f64);
     let lettering = measure.lettering(measure.label(), Align::Middle);
     image.text([centre, row], &label, lettering);
 }
@@ -226,11 +200,7 @@ pub(super) fn draw_color_bar(
             let columns = area.width().round() as usize;
             for i in 0..columns {
                 let left = area.left.round() + i as f64;
-                let strip = Area {
-                    left,
-                    right: left + 1.0,
-                    ..area
-                };
+                let strip = Area { left, right: left + 1.0, ..area };
                 image.fill(strip, color_at((i as f64 + 0.5) / columns as f64));
             }
             draw_lower_axis(image, area, side, measure);
@@ -239,23 +209,15 @@ pub(super) fn draw_color_bar(
             let rows = area.height().round() as usize;
             for i in 0..rows {
                 let top = area.top.round() + i as f64;
-                let strip = Area {
-                    top,
-                    bottom: top + 1.0,
-                    ..area
-                };
+                let strip = Area { top, bottom: top + 1.0, ..area };
                 image.fill(strip, color_at(1.0 - (i as f64 + 0.5) / rows as f64));
             }
             let half = 0.5 * measure.hairline();
             let number = measure.lettering(measure.number(), Align::Start);
             for (value, label) in &side.ticks.labels {
                 let at = (area.bottom - side.axis.share(*value) * area.height()).round();
-                let tick = Area {
-                    left: area.right,
-                    top: at - half,
-                    right: area.right + measure.tick(),
-                    bottom: at + half,
-                };
+                let tick =
+                    Area { left: area.right, top: at - half, right: area.right + measure.tick(), bottom: at + half };
                 image.fill(tick, BLACK);
                 let left = tick.right + 0.6 * measure.gap();
                 image.text([left, at], label, number);

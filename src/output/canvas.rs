@@ -85,11 +85,7 @@ pub(super) struct Lettering {
 impl Image {
     pub(super) fn white(width: usize, height: usize) -> Self {
         let pixels = vec![WHITE; width * height];
-        Self {
-            width,
-            height,
-            pixels,
-        }
+        Self { width, height, pixels }
     }
 
     /// Mixes a colour into a pixel, if that pixel exists.
@@ -122,37 +118,20 @@ impl Image {
     /// Draws the outline of an area, `width` pixels wide, centred on its edges.
     pub(super) fn outline(&mut self, area: Area, width: f64, color: Color) {
         let half = 0.5 * width;
-        let Area {
-            left,
-            top,
-            right,
-            bottom,
-        } = area;
+        let Area { left, top, right, bottom } = area;
         for (left, top, right, bottom) in [
             (left, top, right, top),
             (left, bottom, right, bottom),
             (left, top, left, bottom),
             (right, top, right, bottom),
         ] {
-            let side = Area {
-                left: left - half,
-                top: top - half,
-                right: right + half,
-                bottom: bottom + half,
-            };
+            let side = Area { left: left - half, top: top - half, right: right + half, bottom: bottom + half };
             self.fill(side, color);
         }
     }
 
     /// Draws a straight line with round ends, of which only the part inside `clip` shows.
-    pub(super) fn line(
-        &mut self,
-        from: [f64; 2],
-        to: [f64; 2],
-        width: f64,
-        color: Color,
-        clip: Area,
-    ) {
+    pub(super) fn line(&mut self, from: [f64; 2], to: [f64; 2], width: f64, color: Color, clip: Area) {
         let Some([from, to]) = cut(from, to, clip, width) else {
             return;
         };
@@ -161,11 +140,7 @@ impl Image {
         let squared = along[0] * along[0] + along[1] * along[1];
         // Walk along the longer direction and look at the few pixels across it.
         let main = usize::from(along[1].abs() > along[0].abs());
-        let slope = if along[main] == 0.0 {
-            0.0
-        } else {
-            along[1 - main] / along[main]
-        };
+        let slope = if along[main] == 0.0 { 0.0 } else { along[1 - main] / along[main] };
         // A line at 45 degrees is cut by a column sqrt(2) times its width.
         let across = reach * std::f64::consts::SQRT_2 + 1.0;
         let (start, end) = (from[main].min(to[main]), from[main].max(to[main]));
@@ -173,24 +148,16 @@ impl Image {
             let position = (step as f64 + 0.5).clamp(start, end);
             let centre = from[1 - main] + slope * (position - from[main]);
             for side in (centre - across).floor() as i64..=(centre + across).ceil() as i64 {
-                let (x, y) = if main == 0 {
-                    (step, side)
-                } else {
-                    (side, step)
-                };
+                let (x, y) = if main == 0 { (step, side) } else { (side, step) };
                 let pixel = [x as f64 + 0.5, y as f64 + 0.5];
-                let inside = (clip.left..=clip.right).contains(&pixel[0])
-                    && (clip.top..=clip.bottom).contains(&pixel[1]);
+                let inside =
+                    (clip.left..=clip.right).contains(&pixel[0]) && (clip.top..=clip.bottom).contains(&pixel[1]);
                 if !inside {
                     continue;
                 }
                 let offset = [pixel[0] - from[0], pixel[1] - from[1]];
                 let projection = offset[0] * along[0] + offset[1] * along[1];
-                let share = if squared > 0.0 {
-                    (projection / squared).clamp(0.0, 1.0)
-                } else {
-                    0.0
-                };
+                let share = if squared > 0.0 { (projection / squared).clamp(0.0, 1.0) } else { 0.0 };
                 let distance = (offset[0] - share * along[0]).hypot(offset[1] - share * along[1]);
                 self.blend(x, y, color, reach - distance);
             }
@@ -214,24 +181,15 @@ impl Image {
 
     /// Writes a text from left to right, its capitals centred on the height `at[1]`.
     pub(super) fn text(&mut self, at: [f64; 2], text: &str, lettering: Lettering) {
-        self.letters(text, lettering, |x, y| {
-            (x + at[0].round() as i64, y + at[1].round() as i64)
-        });
+        self.letters(text, lettering, |x, y| (x + at[0].round() as i64, y + at[1].round() as i64));
     }
 
     /// Writes a text from bottom to top, its capitals centred on the column `at[0]`.
     pub(super) fn text_upwards(&mut self, at: [f64; 2], text: &str, lettering: Lettering) {
-        self.letters(text, lettering, |x, y| {
-            (y + at[0].round() as i64, at[1].round() as i64 - x)
-        });
+        self.letters(text, lettering, |x, y| (y + at[0].round() as i64, at[1].round() as i64 - x));
     }
 
-    fn letters(
-        &mut self,
-        text: &str,
-        lettering: Lettering,
-        place: impl Fn(i64, i64) -> (i64, i64),
-    ) {
+    fn letters(&mut self, text: &str, lettering: Lettering, place: impl Fn(i64, i64) -> (i64, i64)) {
         let Some(font) = font() else { return };
         let (glyphs, width) = laid_out(font, text, lettering.size);
         let start = match lettering.align {
@@ -268,9 +226,7 @@ pub(super) fn shortened(text: &str, size: f64, width: f64) -> String {
     let ends: Vec<usize> = text.char_indices().map(|(end, _)| end).collect();
     let short = |end: usize| format!("{}…", text[..end].trim_end());
     let fitting = ends.partition_point(|end| text_width(&short(*end), size) <= width);
-    fitting
-        .checked_sub(1)
-        .map_or_else(String::new, |i| short(ends[i]))
+    fitting.checked_sub(1).map_or_else(String::new, |i| short(ends[i]))
 }
 
 /// The text in lines that are no wider than `width`, broken between words.
@@ -285,17 +241,13 @@ pub(super) fn wrapped(text: &str, size: f64, width: f64) -> Vec<String> {
             _ => lines.push(word.to_owned()),
         }
     }
-    lines
-        .iter()
-        .map(|line| shortened(line, size, width))
-        .collect()
+    lines.iter().map(|line| shortened(line, size, width)).collect()
 }
 
 /// The font lies in the program, so that pictures look the same on every machine.
 fn font() -> Option<&'static FontRef<'static>> {
     static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
-    FONT.get_or_init(|| FontRef::try_from_slice(dejavu::sans::regular()).ok())
-        .as_ref()
+    FONT.get_or_init(|| FontRef::try_from_slice(dejavu::sans::regular()).ok()).as_ref()
 }
 
 /// The letters of a text in place, from x = 0 and with the middle of capitals at y = 0; and its width.
@@ -326,10 +278,7 @@ fn cut(from: [f64; 2], to: [f64; 2], clip: Area, margin: f64) -> Option<[[f64; 2
         return None;
     }
     let low = [clip.left - margin, clip.top - margin];
-    let high = [
-        (clip.right + margin).max(low[0]),
-        (clip.bottom + margin).max(low[1]),
-    ];
+    let high = [(clip.right + margin).max(low[0]), (clip.bottom + margin).max(low[1])];
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     for k in 0..2 {
         let along = to[k] - from[k];
@@ -348,13 +297,9 @@ fn cut(from: [f64; 2], to: [f64; 2], clip: Area, margin: f64) -> Option<[[f64; 2
         return None;
     }
     // Between huge numbers, rounding alone would leave the picture by far.
-    let at =
-        |share: f64| [0, 1].map(|k| (from[k] + share * (to[k] - from[k])).clamp(low[k], high[k]));
+    let at = |share: f64| [0, 1].map(|k| (from[k] + share * (to[k] - from[k])).clamp(low[k], high[k]));
     let ends = [at(enter), at(leave)];
-    ends.as_flattened()
-        .iter()
-        .all(|c| c.is_finite())
-        .then_some(ends)
+    ends.as_flattened().iter().all(|c| c.is_finite()).then_some(ends)
 }
 
 #[cfg(test)]
@@ -365,12 +310,7 @@ mod tests {
     use std::io::BufReader;
 
     fn everywhere(image: &Image) -> Area {
-        Area {
-            left: 0.0,
-            top: 0.0,
-            right: image.width as f64,
-            bottom: image.height as f64,
-        }
+        Area { left: 0.0, top: 0.0, right: image.width as f64, bottom: image.height as f64 }
     }
 
     fn dark(image: &Image) -> usize {
@@ -380,12 +320,7 @@ mod tests {
     #[test]
     fn a_png_decodes_to_the_same_pixels() {
         let mut image = Image::white(37, 19);
-        let area = Area {
-            left: 3.0,
-            top: 4.0,
-            right: 9.0,
-            bottom: 6.0,
-        };
+        let area = Area { left: 3.0, top: 4.0, right: 9.0, bottom: 6.0 };
         image.fill(area, [10, 200, 30]);
         let folder = folder("png");
         let path = folder.join("a.png");
@@ -408,17 +343,10 @@ mod tests {
             let mut image = Image::white(100, 100);
             let all = everywhere(&image);
             image.line([50.0, 50.0], to, 3.0, BLACK, all);
-            let ink: f64 = image
-                .pixels
-                .iter()
-                .map(|p| (255.0 - f64::from(p[0])) / (255.0 - f64::from(BLACK[0])))
-                .sum();
+            let ink: f64 = image.pixels.iter().map(|p| (255.0 - f64::from(p[0])) / (255.0 - f64::from(BLACK[0]))).sum();
             let length = (to[0] - 50.0_f64).hypot(to[1] - 50.0);
             let expected = 3.0 * length + std::f64::consts::PI * 1.5 * 1.5;
-            assert!(
-                (ink / expected - 1.0).abs() < 0.03,
-                "{to:?}: {ink} {expected}"
-            );
+            assert!((ink / expected - 1.0).abs() < 0.03, "{to:?}: {ink} {expected}");
         }
     }
 
@@ -441,11 +369,7 @@ mod tests {
     #[test]
     fn text_is_drawn_inside_its_measured_width() {
         let mut image = Image::white(300, 40);
-        let lettering = Lettering {
-            size: 20.0,
-            color: BLACK,
-            align: Align::Start,
-        };
+        let lettering = Lettering { size: 20.0, color: BLACK, align: Align::Start };
         image.text([10.0, 20.0], "σ [MPa], t = 42.9 µs · 10⁻³", lettering);
         let columns = |image: &Image| {
             let inked = |x: &usize| (0..40).any(|y| image.pixels[y * 300 + x][0] < 200);

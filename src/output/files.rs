@@ -14,21 +14,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 ///
 /// If anything fails the temporary file is removed, a file that stood at `path`
 /// before is left as it was, and the error names `path`.
-pub(super) fn write_whole(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> io::Result<()> {
+pub(super) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     // Two threads may write the same file: the number keeps their temporary files apart.
     static NEXT: AtomicU64 = AtomicU64::new(0);
     let Some(name) = path.file_name() else {
         return Err(named(path, io::ErrorKind::InvalidInput, "not a file name"));
     };
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    let temporary = path.with_file_name(format!(
-        ".{}.{}-{number}.part",
-        name.to_string_lossy(),
-        process::id()
-    ));
+    let temporary = path.with_file_name(format!(".{}.{}-{number}.part", name.to_string_lossy(), process::id()));
     let written = File::create(&temporary)
         .and_then(|file| {
             let mut buffer = BufWriter::with_capacity(1 << 20, file);

@@ -67,10 +67,7 @@ pub struct View {
 
 impl Default for View {
     fn default() -> Self {
-        Self {
-            azimuth: -60.0,
-            elevation: 30.0,
-        }
+        Self { azimuth: -60.0, elevation: 30.0 }
     }
 }
 
@@ -133,11 +130,7 @@ fn draw_line(picture: &Picture, cloud: &CloudView<'_>, time: Option<f64>) -> Ima
         y_label: picture.label.clone(),
         x_range: picture.bounds.map(|[low, high]| (low[0], high[0])),
         y_range: picture.range,
-        series: vec![Series {
-            name: String::new(),
-            points,
-            style: if dots { Style::LineDots } else { Style::Line },
-        }],
+        series: vec![Series { name: String::new(), points, style: if dots { Style::LineDots } else { Style::Line } }],
         ..Plot::default()
     };
     let width = width_of(picture) as usize;
@@ -217,11 +210,7 @@ fn draw_solid(picture: &Picture, cloud: &CloudView<'_>, time: Option<f64>) -> Im
     let pixels = solid::painted(&sight, &screen, cloud, &scale);
     paste_halved(&mut image, page.area, &pixels);
     page.say_if_empty(&mut image, cloud);
-    let strip = Area {
-        top: page.area.bottom,
-        bottom: page.area.bottom + below,
-        ..page.area
-    };
+    let strip = Area { top: page.area.bottom, bottom: page.area.bottom + below, ..page.area };
     solid::draw_triad(&mut image, &sight, strip, page.measure);
     solid::draw_length(&mut image, strip, page.pixels_per_length, page.measure);
     page.draw_surroundings(&mut image, &scale);
@@ -278,11 +267,7 @@ impl Page {
         let bar_side = scale.side(&picture.label);
         let thickness = 20.0 * measure.unit;
         // Beside a flat area an upright bar would be too short to read.
-        let bar_place = if extent[0] > 2.6 * extent[1] {
-            BarPlace::Below
-        } else {
-            BarPlace::Beside
-        };
+        let bar_place = if extent[0] > 2.6 * extent[1] { BarPlace::Below } else { BarPlace::Beside };
         let right = match bar_place {
             BarPlace::Below => 0.5 * measure.label(),
             BarPlace::Beside => thickness + 1.1 * thickness + measure.beside_axis(&bar_side.ticks),
@@ -290,20 +275,11 @@ impl Page {
         let room = (width - 2.0 * margin - beside - right).max(0.2 * width);
         let tallest = 0.95 * width;
         let pixels_per_length = (room / extent[0]).min(tallest / extent[1]);
-        let across = (extent[0] * pixels_per_length)
-            .clamp(0.3 * room, room)
-            .floor();
-        let upright = (extent[1] * pixels_per_length)
-            .clamp(0.08 * width, tallest)
-            .floor();
+        let across = (extent[0] * pixels_per_length).clamp(0.3 * room, room).floor();
+        let upright = (extent[1] * pixels_per_length).clamp(0.08 * width, tallest).floor();
         let left = (margin + beside + 0.5 * (room - across)).floor();
         let top = (margin + heading.height(measure)).floor();
-        let area = Area {
-            left,
-            top,
-            right: left + across,
-            bottom: top + upright,
-        };
+        let area = Area { left, top, right: left + across, bottom: top + upright };
         let (bar, end) = match bar_place {
             BarPlace::Below => {
                 let top = area.bottom + below + 1.2 * measure.label();
@@ -341,10 +317,7 @@ impl Page {
         if cloud.positions.is_empty() {
             let lettering = self.measure.lettering(self.measure.label(), Align::Middle);
             let area = self.area;
-            let centre = [
-                0.5 * (area.left + area.right),
-                0.5 * (area.top + area.bottom),
-            ];
+            let centre = [0.5 * (area.left + area.right), 0.5 * (area.top + area.bottom)];
             image.text(centre, "no points", lettering);
         }
     }
@@ -354,14 +327,7 @@ impl Page {
         let right = self.width as f64 - measure.margin();
         self.heading.draw(image, measure.margin(), right, measure);
         let side = &self.bar_side;
-        draw_color_bar(
-            image,
-            self.bar,
-            self.bar_place,
-            &scale.colors,
-            side,
-            measure,
-        );
+        draw_color_bar(image, self.bar, self.bar_place, &scale.colors, side, measure);
     }
 }
 
@@ -386,10 +352,7 @@ impl ColorScale {
                 _ => [low, high],
             }
         };
-        let given = picture
-            .range
-            .filter(|(a, b)| drawable(*a) && drawable(*b))
-            .map(|(a, b)| [a.min(b), a.max(b)]);
+        let given = picture.range.filter(|(a, b)| drawable(*a) && drawable(*b)).map(|(a, b)| [a.min(b), a.max(b)]);
         let gradient = match picture.color_map {
             ColorMap::Viridis => colorous::VIRIDIS,
             ColorMap::Turbo => colorous::TURBO,
@@ -397,17 +360,12 @@ impl ColorScale {
             ColorMap::Diverging => colorous::RED_BLUE,
         };
         let steps = 512;
-        let mut colors: Vec<Color> = (0..steps)
-            .map(|i| gradient.eval_rational(i, steps).as_array())
-            .collect();
+        let mut colors: Vec<Color> = (0..steps).map(|i| gradient.eval_rational(i, steps).as_array()).collect();
         // The gradient runs from red to blue; high is red everywhere else.
         if picture.color_map == ColorMap::Diverging {
             colors.reverse();
         }
-        Self {
-            range: widened(given.unwrap_or_else(fit)),
-            colors,
-        }
+        Self { range: widened(given.unwrap_or_else(fit)), colors }
     }
 
     /// The colour of a value; those beyond the range take its first or last one.
@@ -453,10 +411,7 @@ impl Squares {
         // a fraction of a pixel, would let white through.
         let overlap = 0.5;
         for (i, position) in cloud.positions.iter().enumerate() {
-            let centre = [
-                (position[0] - self.left) * self.per_length,
-                (self.top - position[1]) * self.per_length,
-            ];
+            let centre = [(position[0] - self.left) * self.per_length, (self.top - position[1]) * self.per_length];
             if !centre.iter().all(|c| drawable(*c)) {
                 continue;
             }
@@ -506,17 +461,10 @@ mod tests {
     use std::io::BufReader;
 
     /// A lattice of `n` by `m` points of spacing 0.1 mm and a value for each.
-    fn lattice(
-        n: usize,
-        m: usize,
-        value: impl Fn(usize, usize) -> f64,
-    ) -> (Vec<[f64; 3]>, Vec<f64>) {
+    fn lattice(n: usize, m: usize, value: impl Fn(usize, usize) -> f64) -> (Vec<[f64; 3]>, Vec<f64>) {
         let indices = || (0..n * m).map(|i| (i % n, i / n));
         let at = |i: usize| (i as f64 + 0.5) * 1e-4;
-        (
-            indices().map(|(i, j)| [at(i), at(j), 0.0]).collect(),
-            indices().map(|(i, j)| value(i, j)).collect(),
-        )
+        (indices().map(|(i, j)| [at(i), at(j), 0.0]).collect(), indices().map(|(i, j)| value(i, j)).collect())
     }
 
     fn viridis(share: f64) -> Color {
@@ -543,25 +491,12 @@ mod tests {
         // Shapes and widths by which edges of squares fall anywhere between pixels.
         for (n, m, width) in [(7, 5, 400), (64, 64, 500), (301, 120, 640), (700, 400, 333)] {
             let (positions, values) = lattice(n, m, |_, _| 0.0);
-            let cloud = CloudView {
-                positions: &positions,
-                sizes: Sizes::Same(1e-4),
-                values: &values,
-                dimension: 2,
-            };
-            let picture = Picture {
-                width,
-                range: Some((0.0, 1.0)),
-                ..Picture::default()
-            };
+            let cloud = CloudView { positions: &positions, sizes: Sizes::Same(1e-4), values: &values, dimension: 2 };
+            let picture = Picture { width, range: Some((0.0, 1.0)), ..Picture::default() };
             let (_, mut found) = area(&picture, &cloud);
             // The colour bar, at the right, begins with the same colour.
             let middle = found[found.len() / 2].1;
-            let row: Vec<usize> = found
-                .iter()
-                .filter(|p| p.1 == middle)
-                .map(|p| p.0)
-                .collect();
+            let row: Vec<usize> = found.iter().filter(|p| p.1 == middle).map(|p| p.0).collect();
             let is_last = |x: &&usize| !row.contains(&(**x + 1));
             let end = *row.iter().find(is_last).unwrap() + 1;
             found.retain(|p| p.0 < end);
@@ -575,10 +510,7 @@ mod tests {
             assert_eq!(found.len(), across * upright, "{n} x {m} at {width}");
             let aspect = across as f64 / upright as f64;
             let expected = n as f64 / m as f64;
-            assert!(
-                (aspect / expected - 1.0).abs() < 0.03,
-                "{aspect} {expected}"
-            );
+            assert!((aspect / expected - 1.0).abs() < 0.03, "{aspect} {expected}");
         }
     }
 
@@ -591,17 +523,8 @@ mod tests {
             (3, 3) => 7.0,
             _ => 0.5,
         });
-        let cloud = CloudView {
-            positions: &positions,
-            sizes: Sizes::Same(1e-4),
-            values: &values,
-            dimension: 2,
-        };
-        let picture = Picture {
-            range: Some((0.0, 1.0)),
-            label: "damage [-]".into(),
-            ..Picture::default()
-        };
+        let cloud = CloudView { positions: &positions, sizes: Sizes::Same(1e-4), values: &values, dimension: 2 };
+        let picture = Picture { range: Some((0.0, 1.0)), label: "damage [-]".into(), ..Picture::default() };
         let folder = folder("picture");
         let path = folder.join("a.png");
         write_png(&draw(&picture, &cloud, None), &path).unwrap();
@@ -610,16 +533,8 @@ mod tests {
         let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut bytes).unwrap();
         let (width, height) = (info.width as usize, info.height as usize);
-        let pixel =
-            |x: usize, y: usize| -> Color { bytes[3 * (y * width + x)..][..3].try_into().unwrap() };
-        let page = Page::new(
-            &picture,
-            None,
-            [4.16e-4, 4.16e-4],
-            &ColorScale::new(&picture, &values),
-            60.0,
-            50.0,
-        );
+        let pixel = |x: usize, y: usize| -> Color { bytes[3 * (y * width + x)..][..3].try_into().unwrap() };
+        let page = Page::new(&picture, None, [4.16e-4, 4.16e-4], &ColorScale::new(&picture, &values), 60.0, 50.0);
         // Any picture of a square has its data in this band; look along a row through
         // the lowest points and one through the highest.
         let x_of = |i: usize| page.area.left + page.area.width() * (i as f64 + 0.58) / 4.16;
@@ -627,17 +542,12 @@ mod tests {
         let at = |i: usize, j: usize| pixel(x_of(i) as usize, y_of(j) as usize);
         assert!(near(at(0, 0), viridis(0.0)), "{:?}", at(0, 0));
         assert!(near(at(3, 0), viridis(1.0)));
-        assert!(
-            near(at(3, 3), viridis(1.0)),
-            "beyond the range: its last colour"
-        );
+        assert!(near(at(3, 3), viridis(1.0)), "beyond the range: its last colour");
         assert!(near(at(1, 2), viridis(0.5)));
         assert_eq!(at(0, 3), NO_VALUE);
         // The colour bar: somewhere right of the data a column runs through all colours.
         let has_all = |x: &usize| {
-            [0.02, 0.3, 0.5, 0.7, 0.98]
-                .iter()
-                .all(|share| (0..height).any(|y| near(pixel(*x, y), viridis(*share))))
+            [0.02, 0.3, 0.5, 0.7, 0.98].iter().all(|share| (0..height).any(|y| near(pixel(*x, y), viridis(*share))))
         };
         assert!((width * 3 / 4..width).any(|x| has_all(&x)));
         fs::remove_dir_all(folder).unwrap();
@@ -645,10 +555,7 @@ mod tests {
 
     #[test]
     fn a_diverging_map_puts_white_at_zero_and_red_above() {
-        let picture = Picture {
-            color_map: ColorMap::Diverging,
-            ..Picture::default()
-        };
+        let picture = Picture { color_map: ColorMap::Diverging, ..Picture::default() };
         let scale = ColorScale::new(&picture, &[-1.0, 4.0]);
         assert!(scale.color(0.0).iter().all(|channel| *channel > 235));
         assert!(scale.color(4.0)[0] > scale.color(4.0)[2]);
@@ -659,10 +566,7 @@ mod tests {
     #[test]
     fn no_cloud_stops_a_picture_from_being_drawn() {
         let bad = [0.0, 1.0, -1e-300, f64::MAX, f64::NAN, f64::INFINITY];
-        let all: Vec<[f64; 3]> = bad
-            .iter()
-            .flat_map(|&a| bad.iter().map(move |&b| [a, b, a]))
-            .collect();
+        let all: Vec<[f64; 3]> = bad.iter().flat_map(|&a| bad.iter().map(move |&b| [a, b, a])).collect();
         let clouds: [&[[f64; 3]]; 4] = [&[], &all[..1], &all[7..9], &all];
         for dimension in 1..4 {
             for positions in clouds {
@@ -678,24 +582,12 @@ mod tests {
                             range,
                             title: "title ".repeat(9),
                             label: "[[label]".repeat(7),
-                            view: View {
-                                azimuth: size,
-                                elevation: 90.0,
-                            },
+                            view: View { azimuth: size, elevation: 90.0 },
                             bounds: (size == 1.0).then_some([[0.0; 3], [size; 3]]),
                             ..Picture::default()
                         };
-                        let sizes = if range.is_none() {
-                            Sizes::Each(&bad)
-                        } else {
-                            Sizes::Same(size)
-                        };
-                        let cloud = CloudView {
-                            positions,
-                            sizes,
-                            values,
-                            dimension,
-                        };
+                        let sizes = if range.is_none() { Sizes::Each(&bad) } else { Sizes::Same(size) };
+                        let cloud = CloudView { positions, sizes, values, dimension };
                         draw(&picture, &cloud, Some(size));
                     }
                 }
@@ -706,17 +598,9 @@ mod tests {
     #[test]
     fn given_bounds_keep_the_scale_while_the_body_moves() {
         let (mut positions, values) = lattice(40, 20, |_, _| 0.0);
-        let picture = Picture {
-            bounds: Some([[-1e-3, -1e-3, 0.0], [6e-3, 4e-3, 0.0]]),
-            ..Picture::default()
-        };
+        let picture = Picture { bounds: Some([[-1e-3, -1e-3, 0.0], [6e-3, 4e-3, 0.0]]), ..Picture::default() };
         let inked = |positions: &[[f64; 3]]| {
-            let cloud = CloudView {
-                positions,
-                sizes: Sizes::Same(1e-4),
-                values: &values,
-                dimension: 2,
-            };
+            let cloud = CloudView { positions, sizes: Sizes::Same(1e-4), values: &values, dimension: 2 };
             let (image, found) = area(&picture, &cloud);
             (image.width, image.height, found.len())
         };
@@ -726,9 +610,6 @@ mod tests {
         }
         let after = inked(&positions);
         assert_eq!((before.0, before.1), (after.0, after.1));
-        assert!(
-            before.2.abs_diff(after.2) < before.2 / 50,
-            "{before:?} {after:?}"
-        );
+        assert!(before.2.abs_diff(after.2) < before.2 / 50, "{before:?} {after:?}");
     }
 }

@@ -69,15 +69,8 @@ pub enum Style {
 /// Colours of the series in their order: Okabe and Ito, "Color universal design"
 /// (2008), which people with any colour vision tell apart; without its yellow,
 /// too pale on white.
-const PALETTE: [Color; 7] = [
-    [0, 114, 178],
-    [213, 94, 0],
-    [0, 158, 115],
-    [204, 121, 167],
-    [230, 159, 0],
-    [86, 180, 233],
-    [40, 40, 40],
-];
+const PALETTE: [Color; 7] =
+    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233], [40, 40, 40]];
 
 /// The size of an image is brought into this range: smaller ones hold no text,
 /// larger ones exhaust the memory.
@@ -94,59 +87,29 @@ pub fn draw_plot(plot: &Plot, width: usize, height: usize) -> Image {
 
     let heading = Heading::new(&plot.title, "", text_width, measure);
     let legend = Legend::new(plot, text_width, measure);
-    let notes: Vec<String> = plot
-        .notes
-        .iter()
-        .flat_map(|note| wrapped(note, measure.number(), text_width))
-        .collect();
+    let notes: Vec<String> = plot.notes.iter().flat_map(|note| wrapped(note, measure.number(), text_width)).collect();
     let note_line = 1.45 * measure.number();
 
     let top = measure.margin() + heading.height(measure) + legend.height(measure);
     let foot = measure.margin() + notes.len() as f64 * note_line;
-    let below = foot
-        + measure.below_axis()
-        + if notes.is_empty() {
-            0.0
-        } else {
-            1.5 * measure.gap()
-        };
+    let below = foot + measure.below_axis() + if notes.is_empty() { 0.0 } else { 1.5 * measure.gap() };
     let bottom = (height - below).max(top + 0.2 * height).min(height - 1.0);
     let top = top.min(bottom - 1.0);
 
     let y_count = label_count(bottom - top, measure, 60.0);
-    let y = side(
-        &plot.y_label,
-        y_values(plot),
-        plot.log_y,
-        plot.y_range,
-        y_count,
-    );
+    let y = side(&plot.y_label, y_values(plot), plot.log_y, plot.y_range, y_count);
     let left = measure.margin() + measure.beside_axis(&y.ticks);
     let left = left.min(0.6 * width);
     let right = width - measure.margin() - 0.5 * measure.label();
     let x_count = label_count(right - left, measure, 90.0);
-    let x = side(
-        &plot.x_label,
-        x_values(plot),
-        plot.log_x,
-        plot.x_range,
-        x_count,
-    );
-    let area = Area {
-        left: left.round(),
-        top: top.round(),
-        right: right.round(),
-        bottom: bottom.round(),
-    };
+    let x = side(&plot.x_label, x_values(plot), plot.log_x, plot.x_range, x_count);
+    let area = Area { left: left.round(), top: top.round(), right: right.round(), bottom: bottom.round() };
 
     draw_grid(&mut image, area, &x, &y, measure);
     for (number, series) in plot.series.iter().enumerate() {
         let place = |&(a, b): &(f64, f64)| {
             let (a, b) = (x.axis.share(a), y.axis.share(b));
-            let at = [
-                area.left + a * area.width(),
-                area.bottom - b * area.height(),
-            ];
+            let at = [area.left + a * area.width(), area.bottom - b * area.height()];
             // Not finite: NaN, or not positive on a logarithmic axis.
             at.iter().all(|c| c.is_finite()).then_some(at)
         };
@@ -154,17 +117,8 @@ pub fn draw_plot(plot: &Plot, width: usize, height: usize) -> Image {
         draw_series(&mut image, &points, area, number, series.style, measure);
     }
     draw_axes(&mut image, area, &x, &y, measure);
-    heading.draw(
-        &mut image,
-        measure.margin(),
-        width - measure.margin(),
-        measure,
-    );
-    legend.draw(
-        &mut image,
-        measure.margin() + heading.height(measure),
-        measure,
-    );
+    heading.draw(&mut image, measure.margin(), width - measure.margin(), measure);
+    legend.draw(&mut image, measure.margin() + heading.height(measure), measure);
     let mut lettering = measure.lettering(measure.number(), Align::Start);
     lettering.color = GREY;
     for (i, note) in notes.iter().enumerate() {
@@ -222,17 +176,11 @@ fn side(
 fn logarithmic_axis(fixed: Option<[f64; 2]>, values: impl Iterator<Item = f64>) -> Axis {
     let [low, high] = fixed.unwrap_or_else(|| {
         // Floor and ceiling keep the padded ends and their powers of ten within f64.
-        let [low, high] = span(values)
-            .unwrap_or([1.0, 10.0])
-            .map(|v| v.clamp(1e-280, 1e280));
+        let [low, high] = span(values).unwrap_or([1.0, 10.0]).map(|v| v.clamp(1e-280, 1e280));
         let padding = (0.05 * (high / low).log10()).max(0.1);
         [low * 10_f64.powf(-padding), high * 10_f64.powf(padding)]
     });
-    Axis {
-        low,
-        high,
-        logarithmic: true,
-    }
+    Axis { low, high, logarithmic: true }
 }
 
 fn draw_series(
@@ -245,9 +193,7 @@ fn draw_series(
 ) {
     let color = PALETTE[number % PALETTE.len()];
     let width = 2.4 * measure.unit;
-    let segments = points
-        .windows(2)
-        .filter_map(|pair| Some([pair[0]?, pair[1]?]));
+    let segments = points.windows(2).filter_map(|pair| Some([pair[0]?, pair[1]?]));
     match style {
         Style::Line | Style::LineDots => {
             for [from, to] in segments {
@@ -287,14 +233,7 @@ fn draw_marker(image: &mut Image, at: [f64; 2], number: usize, measure: Measure)
 }
 
 /// Draws the dashes of one segment; `walked` is the length of line before it, after it on return.
-fn dash(
-    image: &mut Image,
-    [from, to]: [[f64; 2]; 2],
-    walked: f64,
-    color: Color,
-    area: Area,
-    measure: Measure,
-) -> f64 {
+fn dash(image: &mut Image, [from, to]: [[f64; 2]; 2], walked: f64, color: Color, area: Area, measure: Measure) -> f64 {
     let (on, off) = (9.0 * measure.unit, 7.0 * measure.unit);
     let period = on + off;
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
@@ -357,12 +296,7 @@ impl Legend {
     }
 
     fn draw(&self, image: &mut Image, top: f64, measure: Measure) {
-        let all = Area {
-            left: 0.0,
-            top: 0.0,
-            right: image.width as f64,
-            bottom: image.height as f64,
-        };
+        let all = Area { left: 0.0, top: 0.0, right: image.width as f64, bottom: image.height as f64 };
         let lettering = measure.lettering(measure.number(), Align::Start);
         for (row, left, name, number, style) in &self.entries {
             let left = measure.margin() + left;
@@ -372,11 +306,7 @@ impl Legend {
                 Style::Dots => {}
                 _ => {
                     let ends = [Some([left, height]), Some([right, height])];
-                    let line = if *style == Style::Dashed {
-                        *style
-                    } else {
-                        Style::Line
-                    };
+                    let line = if *style == Style::Dashed { *style } else { Style::Line };
                     draw_series(image, &ends, all, *number, line, measure);
                 }
             }
@@ -396,11 +326,7 @@ mod tests {
         Plot {
             x_label: "x".into(),
             y_label: "y".into(),
-            series: vec![Series {
-                points,
-                style,
-                ..Series::default()
-            }],
+            series: vec![Series { points, style, ..Series::default() }],
             ..Plot::default()
         }
     }
@@ -416,19 +342,8 @@ mod tests {
 
     #[test]
     fn no_data_and_no_size_stop_a_plot_from_being_drawn() {
-        let bad = [
-            0.0,
-            -0.0,
-            1.0,
-            -1.0,
-            5e-324,
-            1e-300,
-            f64::MAX,
-            f64::MIN,
-            f64::NAN,
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-        ];
+        let bad =
+            [0.0, -0.0, 1.0, -1.0, 5e-324, 1e-300, f64::MAX, f64::MIN, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
         let all: Vec<_> = bad.iter().flat_map(|&a| bad.map(|b| (a, b))).collect();
         let one_each = all.iter().step_by(3).map(|point| vec![*point]);
         let cases = one_each.chain([vec![], all.clone(), vec![(1.0, 1.0); 3]]);
@@ -465,9 +380,8 @@ mod tests {
             let centre_x = ink.iter().map(|i| i % 600).sum::<usize>() as f64 / ink.len() as f64;
             // The frame: the longest run of dark pixels in the row of the point.
             let row = ink[ink.len() / 2] / 600;
-            let dark: Vec<usize> = (0..600)
-                .filter(|x| image.pixels[row * 600 + x] == super::super::canvas::BLACK)
-                .collect();
+            let dark: Vec<usize> =
+                (0..600).filter(|x| image.pixels[row * 600 + x] == super::super::canvas::BLACK).collect();
             let (left, right) = (dark[dark.len() - 2], dark[dark.len() - 1]);
             let centre = 0.5 * (left + right) as f64;
             assert!((centre_x - centre).abs() < 2.0, "{centre_x} {left} {right}");
@@ -477,33 +391,21 @@ mod tests {
     #[test]
     fn nan_interrupts_a_line_and_a_dashed_line_has_less_ink() {
         let line: Vec<_> = (0..=100).map(|i| (f64::from(i), 1.0)).collect();
-        let whole = count(
-            &draw_plot(&plot(line.clone(), Style::Line), 600, 400),
-            PALETTE[0],
-        );
-        let dashed = count(
-            &draw_plot(&plot(line.clone(), Style::Dashed), 600, 400),
-            PALETTE[0],
-        );
+        let whole = count(&draw_plot(&plot(line.clone(), Style::Line), 600, 400), PALETTE[0]);
+        let dashed = count(&draw_plot(&plot(line.clone(), Style::Dashed), 600, 400), PALETTE[0]);
         let mut broken = line;
         for point in &mut broken[30..70] {
             point.1 = f64::NAN;
         }
         let broken = count(&draw_plot(&plot(broken, Style::Line), 600, 400), PALETTE[0]);
-        assert!(
-            broken < whole * 7 / 10 && broken > whole / 2,
-            "{broken} of {whole}"
-        );
+        assert!(broken < whole * 7 / 10 && broken > whole / 2, "{broken} of {whole}");
         assert!(dashed < whole * 8 / 10 && dashed > 0, "{dashed} of {whole}");
     }
 
     #[test]
     fn series_have_different_colours() {
         let mut plot = plot(vec![(0.0, 0.0), (1.0, 0.0)], Style::Line);
-        plot.series.push(Series {
-            points: vec![(0.0, 1.0), (1.0, 1.0)],
-            ..Series::default()
-        });
+        plot.series.push(Series { points: vec![(0.0, 1.0), (1.0, 1.0)], ..Series::default() });
         let image = draw_plot(&plot, 600, 400);
         assert!(count(&image, PALETTE[0]) > 100 && count(&image, PALETTE[1]) > 100);
     }

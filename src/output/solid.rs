@@ -35,11 +35,7 @@ pub(super) struct Screen {
 impl Sight {
     pub fn new(view: View) -> Self {
         let angle = |degrees: f64| {
-            if drawable(degrees) {
-                degrees.to_radians()
-            } else {
-                0.0
-            }
+            if drawable(degrees) { degrees.to_radians() } else { 0.0 }
         };
         let (sin_a, cos_a) = angle(view.azimuth).sin_cos();
         let (sin_e, cos_e) = angle(view.elevation).sin_cos();
@@ -66,11 +62,7 @@ impl Sight {
         };
         if let Some(corners) = bounds {
             return directions.map(|direction| {
-                let corner = |i: usize| {
-                    (0..3)
-                        .map(|k| corners[(i >> k) & 1][k] * direction[k])
-                        .sum::<f64>()
-                };
+                let corner = |i: usize| (0..3).map(|k| corners[(i >> k) & 1][k] * direction[k]).sum::<f64>();
                 padded(widened(span((0..8).map(corner)).unwrap_or([0.0, 1.0])))
             });
         }
@@ -92,12 +84,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Draws the cubes; the pixels come row by row from the top, white where there is nothing.
-pub(super) fn painted(
-    sight: &Sight,
-    screen: &Screen,
-    cloud: &CloudView<'_>,
-    scale: &ColorScale,
-) -> Vec<Color> {
+pub(super) fn painted(sight: &Sight, screen: &Screen, cloud: &CloudView<'_>, scale: &ColorScale) -> Vec<Color> {
     let mut canvas = Depths::new(screen);
     let cube = Cube::new(sight);
     let slabs = from_front_to_back(sight, screen, cloud);
@@ -168,8 +155,7 @@ impl Cube {
         let sign = |k: usize| if sight.towards[k] < 0.0 { -1.0 } else { 1.0 };
         let axes = [0, 1, 2];
         Self {
-            across: axes
-                .map(|k| [sight.right[k], sight.up[k]].map(|part| sign(k) * part / component(k))),
+            across: axes.map(|k| [sight.right[k], sight.up[k]].map(|part| sign(k) * part / component(k))),
             thickness: axes.map(|k| 1.0 / component(k)),
             light: axes.map(|k| {
                 let normal = [sight.right[k], sight.up[k], sight.towards[k]];
@@ -275,12 +261,7 @@ impl Depths {
         (first as usize).min(count)..(last as usize).min(count)
     }
 
-    fn is_hidden(
-        &self,
-        columns: &std::ops::Range<usize>,
-        rows: &std::ops::Range<usize>,
-        nearest: f32,
-    ) -> bool {
+    fn is_hidden(&self, columns: &std::ops::Range<usize>, rows: &std::ops::Range<usize>, nearest: f32) -> bool {
         (rows.start / BLOCK..=(rows.end - 1) / BLOCK).all(|row| {
             (columns.start / BLOCK..=(columns.end - 1) / BLOCK)
                 .all(|column| self.blocks[row * self.block_columns + column] >= nearest)
@@ -288,59 +269,43 @@ impl Depths {
     }
 
     fn close_blocks(&mut self) {
-        let Self {
-            columns,
-            rows,
-            depth,
-            blocks,
-            block_columns,
-            ..
-        } = self;
-        blocks
-            .par_chunks_mut((*block_columns).max(1))
-            .enumerate()
-            .for_each(|(block_row, farthest)| {
-                farthest.fill(f32::INFINITY);
-                for row in block_row * BLOCK..((block_row + 1) * BLOCK).min(*rows) {
-                    let line = &depth[row * *columns..][..*columns];
-                    for (far, part) in farthest.iter_mut().zip(line.chunks(BLOCK)) {
-                        *far = part.iter().fold(*far, |a, b| a.min(*b));
-                    }
+        let Self { columns, rows, depth, blocks, block_columns, .. } = self;
+        blocks.par_chunks_mut((*block_columns).max(1)).enumerate().for_each(|(block_row, farthest)| {
+            farthest.fill(f32::INFINITY);
+            for row in block_row * BLOCK..((block_row + 1) * BLOCK).min(*rows) {
+                let line = &depth[row * *columns..][..*columns];
+                for (far, part) in farthest.iter_mut().zip(line.chunks(BLOCK)) {
+                    *far = part.iter().fold(*far, |a, b| a.min(*b));
                 }
-            });
+            }
+        });
     }
 
     fn shaded(&self, cube: &Cube, cloud: &CloudView<'_>, scale: &ColorScale) -> Vec<Color> {
         let mut pixels = vec![WHITE; self.columns * self.rows];
-        pixels
-            .par_chunks_mut(self.columns.max(1))
-            .enumerate()
-            .for_each(|(row, line)| {
-                for (column, color) in line.iter_mut().enumerate() {
-                    let pixel = row * self.columns + column;
-                    if self.depth[pixel] == NOTHING {
-                        continue;
-                    }
-                    let (point, face) = self.shown[pixel];
-                    let edge = cloud.sizes.at(point as usize) * self.per_length;
-                    let level = cube.light[face as usize];
-                    let smooth = self
-                        .slope(row, column, edge)
-                        .map_or(level, |[right, up]| lit(normalized([-right, -up, 1.0])));
-                    let light = 0.5 * (level + smooth) * self.openness(row, column, edge);
-                    let full = scale.colors_of(cloud, point as usize);
-                    *color = full.map(|channel| (f64::from(channel) * light).round() as u8);
+        pixels.par_chunks_mut(self.columns.max(1)).enumerate().for_each(|(row, line)| {
+            for (column, color) in line.iter_mut().enumerate() {
+                let pixel = row * self.columns + column;
+                if self.depth[pixel] == NOTHING {
+                    continue;
                 }
-            });
+                let (point, face) = self.shown[pixel];
+                let edge = cloud.sizes.at(point as usize) * self.per_length;
+                let level = cube.light[face as usize];
+                let smooth =
+                    self.slope(row, column, edge).map_or(level, |[right, up]| lit(normalized([-right, -up, 1.0])));
+                let light = 0.5 * (level + smooth) * self.openness(row, column, edge);
+                let full = scale.colors_of(cloud, point as usize);
+                *color = full.map(|channel| (f64::from(channel) * light).round() as u8);
+            }
+        });
         pixels
     }
 
     /// The depth at a pixel some steps away, if something is drawn there.
     fn beside(&self, row: usize, column: usize, [down, along]: [isize; 2]) -> Option<f64> {
         let row = row.checked_add_signed(down).filter(|r| *r < self.rows)?;
-        let column = column
-            .checked_add_signed(along)
-            .filter(|c| *c < self.columns)?;
+        let column = column.checked_add_signed(along).filter(|c| *c < self.columns)?;
         let depth = self.depth[row * self.columns + column];
         (depth != NOTHING).then_some(f64::from(depth))
     }
@@ -368,16 +333,7 @@ impl Depths {
     /// Opposite neighbours are taken together, so that a slope, where one is as
     /// much nearer as the other is farther, counts as a plane.
     fn openness(&self, row: usize, column: usize, edge: f64) -> f64 {
-        const OFFSETS: [[isize; 2]; 8] = [
-            [0, 2],
-            [2, 0],
-            [2, 2],
-            [2, -2],
-            [0, 6],
-            [6, 0],
-            [5, 5],
-            [5, -5],
-        ];
+        const OFFSETS: [[isize; 2]; 8] = [[0, 2], [2, 0], [2, 2], [2, -2], [0, 6], [6, 0], [5, 5], [5, -5]];
         let here = f64::from(self.depth[row * self.columns + column]);
         // Steps of one point are no clefts; and a far step is not darker than a near one.
         let full = (2.5 * edge).clamp(12.0, 60.0);
@@ -398,16 +354,8 @@ impl Depths {
 pub(super) fn draw_triad(image: &mut Image, sight: &Sight, strip: Area, measure: Measure) {
     let (length, margin) = triad_sizes(measure);
     let most = |ends: [f64; 3]| length * ends.into_iter().fold(0.0, f64::max);
-    let origin = [
-        strip.left + margin + most(sight.right.map(|c| -c)),
-        strip.top + margin + most(sight.up),
-    ];
-    let all = Area {
-        left: 0.0,
-        top: 0.0,
-        right: image.width as f64,
-        bottom: image.height as f64,
-    };
+    let origin = [strip.left + margin + most(sight.right.map(|c| -c)), strip.top + margin + most(sight.up)];
+    let all = Area { left: 0.0, top: 0.0, right: image.width as f64, bottom: image.height as f64 };
     let colors = [[200, 40, 40], [30, 140, 50], [40, 80, 200]];
     let lettering = measure.lettering(measure.number(), Align::Middle);
     let mut order = [0, 1, 2];
@@ -458,18 +406,11 @@ mod tests {
 
     /// A block of `n` points along each edge, spacing 1.
     fn block(n: usize) -> Vec<[f64; 3]> {
-        (0..n * n * n)
-            .map(|i| [i % n, i / n % n, i / (n * n)].map(|c| c as f64))
-            .collect()
+        (0..n * n * n).map(|i| [i % n, i / n % n, i / (n * n)].map(|c| c as f64)).collect()
     }
 
     fn canvas(view: View, positions: &[[f64; 3]], size: f64) -> (Depths, Screen) {
-        let cloud = CloudView {
-            positions,
-            sizes: Sizes::Same(size),
-            values: &[],
-            dimension: 3,
-        };
+        let cloud = CloudView { positions, sizes: Sizes::Same(size), values: &[], dimension: 3 };
         let sight = Sight::new(view);
         let shown = sight.extent(&cloud, None);
         let screen = Screen {
@@ -500,15 +441,10 @@ mod tests {
             // Each face appears with the cosine of its angle to the sight.
             let seen: f64 = sight.towards.iter().map(|c| c.abs()).sum();
             let expected = seen * (n as f64 * screen.per_length).powi(2);
-            assert!(
-                (covered / expected - 1.0).abs() < 0.04,
-                "{view:?}: {covered} {expected}"
-            );
+            assert!((covered / expected - 1.0).abs() < 0.04, "{view:?}: {covered} {expected}");
             // No hole: in each row what is covered is one run.
             for row in depths.depth.chunks(depths.columns) {
-                let changes = row
-                    .windows(2)
-                    .filter(|p| (p[0] == NOTHING) != (p[1] == NOTHING));
+                let changes = row.windows(2).filter(|p| (p[0] == NOTHING) != (p[1] == NOTHING));
                 assert!(changes.count() <= 2, "{view:?}");
             }
         }
@@ -519,12 +455,7 @@ mod tests {
         let positions = block(14);
         let view = View::default();
         let (fast, screen) = canvas(view, &positions, 1.0);
-        let cloud = CloudView {
-            positions: &positions,
-            sizes: Sizes::Same(1.0),
-            values: &[],
-            dimension: 3,
-        };
+        let cloud = CloudView { positions: &positions, sizes: Sizes::Same(1.0), values: &[], dimension: 3 };
         let sight = Sight::new(view);
         let mut plain = Depths::new(&screen);
         let cube = Cube::new(&sight);
@@ -537,10 +468,7 @@ mod tests {
 
     #[test]
     fn the_nearer_point_hides_the_farther_one_whatever_their_order() {
-        let view = View {
-            azimuth: 0.0,
-            elevation: 0.0,
-        };
+        let view = View { azimuth: 0.0, elevation: 0.0 };
         for positions in [[[0.0; 3], [5.0, 0.0, 0.0]], [[5.0, 0.0, 0.0], [0.0; 3]]] {
             let (depths, _) = canvas(view, &positions, 1.0);
             let middle = depths.shown[100 * 200 + 100].0 as usize;
@@ -552,17 +480,8 @@ mod tests {
     fn faces_are_told_apart_by_light_and_pictures_repeat_exactly() {
         let positions = block(12);
         let values = vec![0.0; positions.len()];
-        let cloud = CloudView {
-            positions: &positions,
-            sizes: Sizes::Same(1.0),
-            values: &values,
-            dimension: 3,
-        };
-        let picture = Picture {
-            width: 400,
-            range: Some((0.0, 1.0)),
-            ..Picture::default()
-        };
+        let cloud = CloudView { positions: &positions, sizes: Sizes::Same(1.0), values: &values, dimension: 3 };
+        let picture = Picture { width: 400, range: Some((0.0, 1.0)), ..Picture::default() };
         let image = draw(&picture, &cloud, None);
         assert_eq!(image, draw(&picture, &cloud, None));
         let mut counts = std::collections::HashMap::new();
@@ -570,11 +489,8 @@ mod tests {
             *counts.entry(*pixel).or_insert(0_usize) += 1;
         }
         counts.remove(&WHITE);
-        let mut faces: Vec<u8> = counts
-            .into_iter()
-            .filter(|(_, count)| *count > 1000)
-            .map(|(color, _)| color[2])
-            .collect();
+        let mut faces: Vec<u8> =
+            counts.into_iter().filter(|(_, count)| *count > 1000).map(|(color, _)| color[2]).collect();
         faces.sort_unstable();
         // Rounding may give one face two shades.
         faces.dedup_by(|a, b| a.abs_diff(*b) <= 2);

@@ -17,11 +17,7 @@ pub(super) struct Axis {
 
 impl Axis {
     pub fn linear([low, high]: [f64; 2]) -> Self {
-        Self {
-            low,
-            high,
-            logarithmic: false,
-        }
+        Self { low, high, logarithmic: false }
     }
 
     /// How far along the axis a value stands, 0 at the low end and 1 at the high one.
@@ -58,13 +54,10 @@ pub(super) fn drawable(value: f64) -> bool {
 
 /// The range of the drawable values, `None` if there are none.
 pub(super) fn span(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
-    values
-        .into_iter()
-        .filter(|value| drawable(*value))
-        .fold(None, |range, value| {
-            let [low, high] = range.unwrap_or([value, value]);
-            Some([value.min(low), value.max(high)])
-        })
+    values.into_iter().filter(|value| drawable(*value)).fold(None, |range, value| {
+        let [low, high] = range.unwrap_or([value, value]);
+        Some([value.min(low), value.max(high)])
+    })
 }
 
 /// The range, made wide enough to be drawn if its ends coincide or nearly do.
@@ -108,25 +101,16 @@ fn linear_ticks(low: f64, high: f64, count: usize, factor: f64) -> Ticks {
         }
     };
     // Adding 0.0 turns a negative zero into zero.
-    let labels = (0..=steps)
-        .map(|i| (first + i as f64) * step + 0.0)
-        .map(|value| (value / factor, label(value)))
-        .collect();
-    Ticks {
-        labels,
-        minor: Vec::new(),
-    }
+    let labels =
+        (0..=steps).map(|i| (first + i as f64) * step + 0.0).map(|value| (value / factor, label(value))).collect();
+    Ticks { labels, minor: Vec::new() }
 }
 
 /// The smallest of 1, 2, 2.5, 5 times a power of ten that is not below `step`.
 pub(super) fn round_step(step: f64) -> f64 {
     let power = 10.0_f64.powf(step.log10().floor());
     let tolerance = 1.0 + 1e-9;
-    [1.0, 2.0, 2.5, 5.0, 10.0]
-        .into_iter()
-        .find(|round| round * power * tolerance >= step)
-        .unwrap_or(10.0)
-        * power
+    [1.0, 2.0, 2.5, 5.0, 10.0].into_iter().find(|round| round * power * tolerance >= step).unwrap_or(10.0) * power
 }
 
 /// Powers of ten, thinned out if there are many; 1, 2, 5 if there are few; round steps if still fewer.
@@ -135,31 +119,20 @@ fn logarithmic_ticks(low: f64, high: f64, count: usize) -> Ticks {
         return Ticks::default();
     }
     // All powers that f64 has lie within; the bounds only keep a wrong range from looping.
-    let (first, last) = (
-        low.log10().floor().max(-330.0) as i32,
-        high.log10().ceil().min(310.0) as i32,
-    );
+    let (first, last) = (low.log10().floor().max(-330.0) as i32, high.log10().ceil().min(310.0) as i32);
     let tolerance = 1e-9;
     let inside = |value: &f64| (low * (1.0 - tolerance)..=high * (1.0 + tolerance)).contains(value);
     let at = |digits: &[i32], every: i32| -> Vec<f64> {
         (first..=last)
             .filter(|power| power.rem_euclid(every) == 0)
-            .flat_map(|power| {
-                digits
-                    .iter()
-                    .map(move |&d| f64::from(d) * power_of_ten(power))
-            })
+            .flat_map(|power| digits.iter().map(move |&d| f64::from(d) * power_of_ten(power)))
             .filter(inside)
             .collect()
     };
     let decades = high.log10() - low.log10();
     let every = ((decades / count.max(1) as f64).ceil() as i32).max(1);
     let mut labelled = at(&[1], every);
-    let mut minor = if every == 1 {
-        at(&[2, 3, 4, 5, 6, 7, 8, 9], 1)
-    } else {
-        at(&[1], 1)
-    };
+    let mut minor = if every == 1 { at(&[2, 3, 4, 5, 6, 7, 8, 9], 1) } else { at(&[1], 1) };
     if labelled.len() < 3 && every == 1 {
         let some = at(&[1, 2, 5], 1);
         if some.len() <= count.max(3) {
@@ -171,23 +144,11 @@ fn logarithmic_ticks(low: f64, high: f64, count: usize) -> Ticks {
     }
     minor.retain(|value| !labelled.contains(value));
     // One way of writing on one axis: plain numbers, unless the powers are far from 1.
-    let plain = labelled
-        .iter()
-        .all(|value| (0.99e-3..1.01e4).contains(value));
+    let plain = labelled.iter().all(|value| (0.99e-3..1.01e4).contains(value));
     let label = |value: f64| {
-        if plain {
-            format!("{}", (value * 1e6).round() / 1e6)
-        } else {
-            powers_written(&format!("{value:.0e}"))
-        }
+        if plain { format!("{}", (value * 1e6).round() / 1e6) } else { powers_written(&format!("{value:.0e}")) }
     };
-    Ticks {
-        labels: labelled
-            .into_iter()
-            .map(|value| (value, label(value)))
-            .collect(),
-        minor,
-    }
+    Ticks { labels: labelled.into_iter().map(|value| (value, label(value))).collect(), minor }
 }
 
 /// Parsed, because `powi` is off by rounding and 1e-3 must be the same number as in the data.
@@ -211,10 +172,7 @@ fn powers_written(text: &str) -> String {
 
 fn raised(power: &str) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    power
-        .chars()
-        .map(|c| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize]))
-        .collect()
+    power.chars().map(|c| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize])).collect()
 }
 
 fn minus_written(text: &str) -> String {
@@ -318,10 +276,7 @@ mod tests {
     #[test]
     fn linear_ticks_are_round_and_inside() {
         let ticks = |low, high| Axis::linear([low, high]).ticks(5, 1.0);
-        assert_eq!(
-            words(&ticks(0.0, 1.0)),
-            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
-        );
+        assert_eq!(words(&ticks(0.0, 1.0)), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
         assert_eq!(words(&ticks(-3.1, 4.9)), ["−2", "0", "2", "4"]);
         assert_eq!(words(&ticks(0.0, 2e8))[1], "5×10⁷");
         let milli = Axis::linear([0.0, 0.1]).ticks(5, 1e3);
@@ -331,25 +286,11 @@ mod tests {
 
     #[test]
     fn no_range_gives_more_than_a_few_ticks_or_hangs() {
-        let ends = [
-            0.0,
-            -0.0,
-            1.0,
-            1.0 + 1e-15,
-            -1e-300,
-            1e289,
-            -1e289,
-            5e-324,
-            f64::NAN,
-        ];
+        let ends = [0.0, -0.0, 1.0, 1.0 + 1e-15, -1e-300, 1e289, -1e289, 5e-324, f64::NAN];
         for low in ends {
             for high in ends {
                 for logarithmic in [false, true] {
-                    let axis = Axis {
-                        low,
-                        high,
-                        logarithmic,
-                    };
+                    let axis = Axis { low, high, logarithmic };
                     assert!(axis.ticks(6, 1.0).labels.len() < 40, "{axis:?}");
                 }
                 let [low, high] = widened([low.min(high), high.max(low)]);
@@ -360,18 +301,8 @@ mod tests {
 
     #[test]
     fn logarithmic_ticks_are_powers_or_one_two_five() {
-        let ticks = |low, high| {
-            Axis {
-                low,
-                high,
-                logarithmic: true,
-            }
-            .ticks(6, 1.0)
-        };
-        assert_eq!(
-            words(&ticks(1e-6, 1e-2)),
-            ["10⁻⁶", "10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²"]
-        );
+        let ticks = |low, high| Axis { low, high, logarithmic: true }.ticks(6, 1.0);
+        assert_eq!(words(&ticks(1e-6, 1e-2)), ["10⁻⁶", "10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²"]);
         assert_eq!(words(&ticks(0.09, 1.1)), ["0.1", "0.2", "0.5", "1"]);
         assert_eq!(words(&ticks(1e-20, 1.0)).len(), 6);
         assert!(ticks(1.11, 1.29).labels.len() >= 2);
@@ -400,10 +331,7 @@ mod tests {
         assert_eq!(scaled("velocity [m/s]", 0.02), "velocity [mm/s]");
         assert_eq!(scaled("damage [-]", 1.0), "damage [-]");
         assert_eq!(scaled("damage [-]", 2e-4), "damage [10⁻⁶]");
-        assert_eq!(
-            scaled("energy density [kg/m³]", 2e6),
-            "energy density [10⁶ kg/m³]"
-        );
+        assert_eq!(scaled("energy density [kg/m³]", 2e6), "energy density [10⁶ kg/m³]");
         assert_eq!(scaled("error", 2e-5), "error [10⁻⁶]");
         assert_eq!(scaled_label("u [m]", 2e-5), ("u [µm]".to_owned(), 1e6));
     }

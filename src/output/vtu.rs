@@ -53,8 +53,7 @@ pub fn write_vtu(
     time: f64,
     precision: Precision,
 ) -> io::Result<()> {
-    check(positions.len(), fields)
-        .map_err(|reason| named(path, io::ErrorKind::InvalidInput, reason))?;
+    check(positions.len(), fields).map_err(|reason| named(path, io::ErrorKind::InvalidInput, reason))?;
     let count = positions.len();
     let mut appended = Appended::default();
     let mut xml = String::from(concat!(
@@ -121,10 +120,7 @@ pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> io::Result<()> {
     ));
     for (time, file) in frames {
         let file = escaped(file);
-        let _ = writeln!(
-            xml,
-            "<DataSet timestep=\"{time:e}\" group=\"\" part=\"0\" file=\"{file}\"/>"
-        );
+        let _ = writeln!(xml, "<DataSet timestep=\"{time:e}\" group=\"\" part=\"0\" file=\"{file}\"/>");
     }
     xml.push_str("</Collection>\n</VTKFile>\n");
     write_whole(path, |file| file.write_all(xml.as_bytes()))
@@ -153,9 +149,7 @@ fn check(count: usize, fields: &[(&str, FieldData<'_>)]) -> Result<(), String> {
     for (i, (name, data)) in fields.iter().enumerate() {
         let length = data.len();
         if length != count {
-            return Err(format!(
-                "field `{name}` has {length} values, the cloud has {count} points"
-            ));
+            return Err(format!("field `{name}` has {length} values, the cloud has {count} points"));
         }
         if fields[..i].iter().any(|(other, _)| other == name) {
             return Err(format!("two fields are named `{name}`"));
@@ -240,10 +234,7 @@ fn integers(count: usize, value: impl Fn(usize) -> i64 + Sync) -> Packed {
 
 fn compressed(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 2), Compression::fast());
-    encoder
-        .write_all(bytes)
-        .and_then(|()| encoder.finish())
-        .expect("a Vec takes every byte")
+    encoder.write_all(bytes).and_then(|()| encoder.finish()).expect("a Vec takes every byte")
 }
 
 /// Text that may stand in an XML attribute. Control characters, which XML has no way to write, become `_`.
@@ -279,14 +270,11 @@ mod tests {
         let mark = b"<AppendedData encoding=\"raw\">\n   _";
         let start = file.windows(mark.len()).position(|w| w == mark).unwrap();
         let xml = std::str::from_utf8(&file[..start]).unwrap();
-        let line = xml
-            .lines()
-            .find(|l| l.contains(&format!("Name=\"{name}\"")));
+        let line = xml.lines().find(|l| l.contains(&format!("Name=\"{name}\"")));
         let offset = line.unwrap().split("offset=\"").nth(1).unwrap();
         let offset: usize = offset.split('"').next().unwrap().parse().unwrap();
         let data = &file[start + mark.len() + offset..];
-        let number =
-            |i: usize| u64::from_le_bytes(data[8 * i..8 * i + 8].try_into().unwrap()) as usize;
+        let number = |i: usize| u64::from_le_bytes(data[8 * i..8 * i + 8].try_into().unwrap()) as usize;
         let mut at = 8 * (3 + number(0));
         let mut bytes = Vec::new();
         for block in 0..number(0) {
@@ -323,10 +311,8 @@ mod tests {
             let read: Vec<f64> = array(&file, "Points").chunks(8).map(real).collect();
             assert_eq!(read, positions.as_flattened());
             assert_eq!(array(&file, "velocity"), array(&file, "Points"));
-            let read: Vec<i64> = array(&file, "mark")
-                .chunks(8)
-                .map(|bytes| i64::from_le_bytes(bytes.try_into().unwrap()))
-                .collect();
+            let read: Vec<i64> =
+                array(&file, "mark").chunks(8).map(|bytes| i64::from_le_bytes(bytes.try_into().unwrap())).collect();
             assert_eq!(read, marks);
             assert_eq!(array(&file, "types"), vec![1; count]);
         }
@@ -341,10 +327,7 @@ mod tests {
         let fields = [("a<b>&\"c\"", FieldData::Scalar(&values))];
         write_vtu(&path, &[[0.0; 3]; 2], &fields, 0.0, Precision::Float32).unwrap();
         let bytes = array(&fs::read(&path).unwrap(), "a&lt;b&gt;&amp;&quot;c&quot;");
-        let read: Vec<f32> = bytes
-            .chunks(4)
-            .map(|four| f32::from_le_bytes(four.try_into().unwrap()))
-            .collect();
+        let read: Vec<f32> = bytes.chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect();
         assert_eq!(read[0], 0.1_f32);
         assert!(read[1].is_nan());
         fs::remove_dir_all(folder).unwrap();
@@ -355,15 +338,10 @@ mod tests {
         let path = Path::new("/no/such/folder/frame.vtu");
         let short = FieldData::Scalar(&[1.0]);
         let write = |fields: &[(&str, FieldData<'_>)]| {
-            write_vtu(path, &[[0.0; 3]; 2], fields, 0.0, Precision::Float64)
-                .unwrap_err()
-                .to_string()
+            write_vtu(path, &[[0.0; 3]; 2], fields, 0.0, Precision::Float64).unwrap_err().to_string()
         };
         let said = write(&[("damage", short)]);
-        assert!(
-            said.contains("frame.vtu: field `damage` has 1 values"),
-            "{said}"
-        );
+        assert!(said.contains("frame.vtu: field `damage` has 1 values"), "{said}");
         let full = FieldData::Scalar(&[1.0, 2.0]);
         let said = write(&[("u", full), ("u", full)]);
         assert!(said.contains("two fields are named `u`"), "{said}");
@@ -373,17 +351,11 @@ mod tests {
     fn a_series_lists_times_that_parse_back_exactly() {
         let folder = folder("pvd");
         let path = folder.join("run.pvd");
-        let frames = [
-            (0.0, "run_0.vtu".to_owned()),
-            (1.0 / 3e7, "a&b.vtu".to_owned()),
-        ];
+        let frames = [(0.0, "run_0.vtu".to_owned()), (1.0 / 3e7, "a&b.vtu".to_owned())];
         write_pvd(&path, &frames).unwrap();
         let text = fs::read_to_string(&path).unwrap();
-        let times: Vec<f64> = text
-            .split("timestep=\"")
-            .skip(1)
-            .map(|rest| rest.split('"').next().unwrap().parse().unwrap())
-            .collect();
+        let times: Vec<f64> =
+            text.split("timestep=\"").skip(1).map(|rest| rest.split('"').next().unwrap().parse().unwrap()).collect();
         assert_eq!(times, [0.0, 1.0 / 3e7]);
         assert!(text.contains("file=\"a&amp;b.vtu\""));
         fs::remove_dir_all(folder).unwrap();

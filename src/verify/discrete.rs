@@ -34,12 +34,7 @@ pub struct DiscreteModuli {
 /// columns of points: the point k − ½ spacings to the left of the plane holds those with ξ₁ ≥ k h,
 /// so a bond of ξ₁ = i h > 0 is held by i points. Shojaei et al. 2022, eq. (26), with β of eq. (28)
 /// for [`PartialVolume::Ramp`].
-pub fn discrete_moduli(
-    hypothesis: Hypothesis,
-    influence: &Influence,
-    rule: PartialVolume,
-    m: f64,
-) -> DiscreteModuli {
+pub fn discrete_moduli(hypothesis: Hypothesis, influence: &Influence, rule: PartialVolume, m: f64) -> DiscreteModuli {
     match hypothesis.dimension() {
         1 => lattice_moduli::<1>(hypothesis, influence, rule, m),
         2 => lattice_moduli::<2>(hypothesis, influence, rule, m),
@@ -76,18 +71,11 @@ fn lattice_moduli<const D: usize>(
         }
         sum_plane += 0.25 * weight * s0 * s0 * r * xi[0].abs();
     }
-    DiscreteModuli {
-        c11: sum11 / c11,
-        c12: (D > 1).then(|| sum12 / c12),
-        fracture_energy: sum_plane,
-    }
+    DiscreteModuli { c11: sum11 / c11, c12: (D > 1).then(|| sum12 / c12), fracture_energy: sum_plane }
 }
 
 /// Points of the unit lattice with β > 0 about a source at the origin, as (ξ, β).
-fn lattice_points<const D: usize>(
-    rule: PartialVolume,
-    m: f64,
-) -> impl Iterator<Item = ([f64; D], f64)> {
+fn lattice_points<const D: usize>(rule: PartialVolume, m: f64) -> impl Iterator<Item = ([f64; D], f64)> {
     let range = rule.reach::<D>(1.0, m).ceil() as i64;
     let side = 2 * range + 1;
     (0..side.pow(D as u32)).filter_map(move |index| {
@@ -107,54 +95,14 @@ mod tests {
 
     /// Own numbers from an independent script, to the four digits kept; 1e-4 is their last digit.
     const TABLE: [Row; 8] = [
-        (
-            Hypothesis::PlaneStress,
-            2.0,
-            [1.1800, 0.6752, 0.9786],
-            [1.1172, 1.0359, 1.1712],
-        ),
-        (
-            Hypothesis::PlaneStress,
-            3.0,
-            [1.0528, 1.0051, 1.0261],
-            [1.0327, 0.9825, 1.0342],
-        ),
-        (
-            Hypothesis::PlaneStress,
-            4.0,
-            [0.9743, 0.9266, 0.9290],
-            [1.0158, 1.0037, 1.0210],
-        ),
-        (
-            Hypothesis::PlaneStress,
-            5.0,
-            [1.0271, 1.1164, 1.0696],
-            [1.0176, 1.0121, 1.0239],
-        ),
-        (
-            Hypothesis::PlaneStress,
-            6.0,
-            [0.9905, 1.0239, 0.9960],
-            [1.0080, 0.9996, 1.0091],
-        ),
-        (
-            Hypothesis::PlaneStress,
-            8.0,
-            [0.9648, 0.9858, 0.9590],
-            [1.0009, 0.9941, 0.9988],
-        ),
-        (
-            Hypothesis::Solid,
-            3.0,
-            [1.0564, 1.2175, 1.1477],
-            [1.0703, 1.0500, 1.0712],
-        ),
-        (
-            Hypothesis::Solid,
-            4.0,
-            [0.9343, 0.9566, 0.9133],
-            [1.0274, 1.0256, 1.0300],
-        ),
+        (Hypothesis::PlaneStress, 2.0, [1.1800, 0.6752, 0.9786], [1.1172, 1.0359, 1.1712]),
+        (Hypothesis::PlaneStress, 3.0, [1.0528, 1.0051, 1.0261], [1.0327, 0.9825, 1.0342]),
+        (Hypothesis::PlaneStress, 4.0, [0.9743, 0.9266, 0.9290], [1.0158, 1.0037, 1.0210]),
+        (Hypothesis::PlaneStress, 5.0, [1.0271, 1.1164, 1.0696], [1.0176, 1.0121, 1.0239]),
+        (Hypothesis::PlaneStress, 6.0, [0.9905, 1.0239, 0.9960], [1.0080, 0.9996, 1.0091]),
+        (Hypothesis::PlaneStress, 8.0, [0.9648, 0.9858, 0.9590], [1.0009, 0.9941, 0.9988]),
+        (Hypothesis::Solid, 3.0, [1.0564, 1.2175, 1.1477], [1.0703, 1.0500, 1.0712]),
+        (Hypothesis::Solid, 4.0, [0.9343, 0.9566, 0.9133], [1.0274, 1.0256, 1.0300]),
     ];
 
     #[test]
@@ -165,10 +113,7 @@ mod tests {
                 let found = [found.c11, found.c12.unwrap(), found.fracture_energy];
                 for (found, expected) in found.iter().zip(expected) {
                     let label = format!("{} m={m} {}", hypothesis.name(), rule.name());
-                    assert!(
-                        (found - expected).abs() < 1e-4,
-                        "{label}: {found} against {expected}"
-                    );
+                    assert!((found - expected).abs() < 1e-4, "{label}: {found} against {expected}");
                 }
             }
         }
@@ -192,21 +137,12 @@ mod tests {
             let closed = [
                 (Influence::Constant, PartialVolume::Ramp, 1.0),
                 (Influence::Linear, PartialVolume::Ramp, 1.0 - 1.0 / (m * m)),
-                (
-                    Influence::Inverted,
-                    PartialVolume::Ramp,
-                    1.0 + 0.5 / (m * m),
-                ),
+                (Influence::Inverted, PartialVolume::Ramp, 1.0 + 0.5 / (m * m)),
                 (Influence::Constant, PartialVolume::None, 1.0 + 1.0 / m),
             ];
             for (influence, rule, expected) in closed {
                 let found = discrete_moduli(Hypothesis::Bar, &influence, rule, m);
-                assert!(
-                    (found.c11 - expected).abs() < 1e-13,
-                    "{} m={m}: {}",
-                    influence.name(),
-                    found.c11
-                );
+                assert!((found.c11 - expected).abs() < 1e-13, "{} m={m}: {}", influence.name(), found.c11);
                 assert_eq!(found.c12, None);
             }
         }
@@ -216,12 +152,8 @@ mod tests {
     fn the_sum_over_columns_counts_the_bonds_across_a_plane() {
         // The definition, column by column: points at (k − ½) h to the left of the plane, bonds
         // that end to its right.
-        let (hypothesis, influence, rule, m) = (
-            Hypothesis::PlaneStress,
-            Influence::Parabolic,
-            PartialVolume::Ramp,
-            4.0,
-        );
+        let (hypothesis, influence, rule, m) =
+            (Hypothesis::PlaneStress, Influence::Parabolic, PartialVolume::Ramp, 4.0);
         let c = micromodulus(hypothesis, &influence, 1.0, m);
         let s0 = critical_stretch(hypothesis, &influence, c, 1.0, m);
         let mut energy = 0.0;
@@ -240,16 +172,9 @@ mod tests {
     fn ratios_tend_to_one_with_exact_volumes() {
         for hypothesis in Hypothesis::ALL {
             for influence in Influence::ALL {
-                let m = if hypothesis == Hypothesis::Solid {
-                    12.0
-                } else {
-                    40.0
-                };
+                let m = if hypothesis == Hypothesis::Solid { 12.0 } else { 40.0 };
                 let found = discrete_moduli(hypothesis, &influence, PartialVolume::Exact, m);
-                for ratio in [Some(found.c11), found.c12, Some(found.fracture_energy)]
-                    .into_iter()
-                    .flatten()
-                {
+                for ratio in [Some(found.c11), found.c12, Some(found.fracture_energy)].into_iter().flatten() {
                     let label = format!("{} {}", hypothesis.name(), influence.name());
                     assert!((ratio - 1.0).abs() < 0.02, "{label}: {ratio}");
                 }

@@ -45,7 +45,10 @@ pub fn read<const D: usize>(path: &Path) -> Result<Points<D>> {
         let found: Vec<usize> = (0..headers.len()).filter(|&k| &headers[k] == name).collect();
         match found[..] {
             [k] => Ok(k),
-            [] => Err(refuse(1, format!("column `{name}` is missing; found: {}", headers.iter().collect::<Vec<_>>().join(", ")))),
+            [] => Err(refuse(
+                1,
+                format!("column `{name}` is missing; found: {}", headers.iter().collect::<Vec<_>>().join(", ")),
+            )),
             _ => Err(refuse(1, format!("column `{name}` stands {} times", found.len()))),
         }
     };
@@ -66,7 +69,10 @@ pub fn read<const D: usize>(path: &Path) -> Result<Points<D>> {
             let cell = &record[k];
             match cell.parse::<f64>() {
                 Ok(x) if x.is_finite() => Ok(x),
-                _ => Err(refuse(line, format!("column `{}`: found `{cell}`, where a finite number is wanted", &headers[k]))),
+                _ => Err(refuse(
+                    line,
+                    format!("column `{}`: found `{cell}`, where a finite number is wanted", &headers[k]),
+                )),
             }
         };
         let mut position = [0.0; D];

@@ -20,14 +20,17 @@ pub struct BondBasedLinear;
 impl<const D: usize> BondLaw<D> for BondBased {
     #[inline(always)]
     fn force<L: Lane>(&self, bond: &Bond<D, L>, eta: [L; D]) -> ([L; D], L) {
-        let y: [L; D] = std::array::from_fn(|d| bond.xi[d] + eta[d]);
         let q = elongation(bond, eta);
         let length = bond.length;
         let r = (length * length + q).sqrt();
         let inverse = L::splat(1.0) / (length * (r + length) * r);
         let stretch = q * inverse * r;
         let g = bond.weight * q * inverse;
-        (y.map(|y| g * y), stretch)
+        let mut force = eta;
+        for d in 0..D {
+            force[d] = g * (bond.xi[d] + eta[d]);
+        }
+        (force, stretch)
     }
 
     #[inline(always)]
@@ -49,7 +52,11 @@ impl<const D: usize> BondLaw<D> for BondBasedLinear {
     fn force<L: Lane>(&self, bond: &Bond<D, L>, eta: [L; D]) -> ([L; D], L) {
         let stretch = along(bond, eta) / (bond.length * bond.length);
         let g = bond.weight * stretch / bond.length;
-        (bond.xi.map(|xi| g * xi), stretch)
+        let mut force = bond.xi;
+        for d in 0..D {
+            force[d] = g * bond.xi[d];
+        }
+        (force, stretch)
     }
 
     #[inline(always)]

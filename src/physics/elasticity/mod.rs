@@ -112,27 +112,34 @@ impl<L> Elasticity<L> {
             (Families::Lattice(families), BondWeights::Lattice(weights), _) => {
                 families.offsets.iter().zip(weights).map(|(o, w)| self.law.tangent(o.length, *w)).sum::<f64>()
             }
-            (
-                Families::Cloud(families),
-                BondWeights::Cloud(weights),
-                Arrangement::Scattered { positions, volumes },
-            ) => (0..positions.len())
-                .map(|i| {
-                    let mut sum = 0.0;
-                    for bond in families.of(i) {
-                        let j = families.neighbours[bond] as usize;
-                        if j != i {
-                            let length = norm(&difference(&positions[j], &positions[i]));
-                            sum += self.law.tangent(length, weights.weight(bond, length, volumes[j]));
+            (Families::Cloud(families), BondWeights::Cloud(weights), Arrangement::Scattered { positions, volumes }) => {
+                (0..positions.len())
+                    .map(|i| {
+                        let mut sum = 0.0;
+                        for bond in families.of(i) {
+                            let j = families.neighbours[bond] as usize;
+                            if j != i {
+                                let length = norm(&difference(&positions[j], &positions[i]));
+                                sum += self.law.tangent(length, weights.weight(bond, length, volumes[j]));
+                            }
                         }
-                    }
-                    sum
-                })
-                .fold(0.0, f64::max),
+                        sum
+                    })
+                    .fold(0.0, f64::max)
+            }
             _ => unreachable!("weights are built on the families of their body"),
         };
         (2.0 * self.density / stiffest).sqrt()
     }
+}
+
+/// η = u′ − u
+#[inline(always)]
+fn relative<const D: usize, L: Lane>(here: [L; D], mut there: [L; D]) -> [L; D] {
+    for d in 0..D {
+        there[d] = there[d] - here[d];
+    }
+    there
 }
 
 /// Σ f
@@ -143,7 +150,7 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, D> for Force<B> {
 
     #[inline(always)]
     fn evaluate<L: Lane>(&self, bond: &Bond<D, L>, here: [L; D], there: [L; D]) -> ([L; D], L) {
-        self.0.force(bond, std::array::from_fn(|d| there[d] - here[d]))
+        self.0.force(bond, relative(here, there))
     }
 }
 
@@ -153,7 +160,7 @@ struct Energy<L>(L);
 impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, 1> for Energy<B> {
     #[inline(always)]
     fn evaluate<L: Lane>(&self, bond: &Bond<D, L>, here: [L; D], there: [L; D]) -> ([L; 1], L) {
-        let energy = self.0.energy(bond, std::array::from_fn(|d| there[d] - here[d]));
+        let energy = self.0.energy(bond, relative(here, there));
         ([L::splat(0.5) * energy], L::splat(0.0))
     }
 }
@@ -190,8 +197,7 @@ impl<const D: usize, L: BondLaw<D>> BreakRule<D> for Breaking<'_, D, L> {
     /// step: what the bond held, and what it still took from the motion, since velocity Verlet kicks with its force at
     /// the start of the step and no longer with that at the end. So the books balance whatever the step.
     fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
-        let change: [f64; D] =
-            std::array::from_fn(|d| self.dt * (self.velocity[d][there] - self.velocity[d][here]));
+        let change: [f64; D] = std::array::from_fn(|d| self.dt * (self.velocity[d][there] - self.velocity[d][here]));
         let before: [f64; D] =
             std::array::from_fn(|d| self.displacement[d][there] - self.displacement[d][here] - change[d]);
         let (force, _) = self.law.force(bond, before);

@@ -39,12 +39,8 @@ pub struct Stiffness {
 
 impl Hypothesis {
     /// Every hypothesis once.
-    pub const ALL: [Hypothesis; 4] = [
-        Hypothesis::Bar,
-        Hypothesis::PlaneStress,
-        Hypothesis::PlaneStrain,
-        Hypothesis::Solid,
-    ];
+    pub const ALL: [Hypothesis; 4] =
+        [Hypothesis::Bar, Hypothesis::PlaneStress, Hypothesis::PlaneStrain, Hypothesis::Solid];
 
     /// Name in case files and lists.
     pub fn name(&self) -> &'static str {
@@ -92,23 +88,14 @@ impl Hypothesis {
     /// ```
     pub fn stiffness_with(&self, young: f64, poisson: f64) -> Stiffness {
         match self {
-            Hypothesis::Bar => Stiffness {
-                c11: young,
-                c12: 0.0,
-            },
+            Hypothesis::Bar => Stiffness { c11: young, c12: 0.0 },
             Hypothesis::PlaneStress => {
                 let c11 = young / (1.0 - poisson * poisson);
-                Stiffness {
-                    c11,
-                    c12: poisson * c11,
-                }
+                Stiffness { c11, c12: poisson * c11 }
             }
             Hypothesis::PlaneStrain | Hypothesis::Solid => {
                 let common = young / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
-                Stiffness {
-                    c11: (1.0 - poisson) * common,
-                    c12: poisson * common,
-                }
+                Stiffness { c11: (1.0 - poisson) * common, c12: poisson * common }
             }
         }
     }
@@ -152,12 +139,7 @@ impl Hypothesis {
 /// let c = micromodulus(Hypothesis::PlaneStress, &Influence::Constant, 72e9, 1e-3);
 /// assert!((c - 9.0 * 72e9 / (std::f64::consts::PI * 1e-9)).abs() < 1e-12 * c);
 /// ```
-pub fn micromodulus(
-    hypothesis: Hypothesis,
-    influence: &Influence,
-    young: f64,
-    horizon: f64,
-) -> f64 {
+pub fn micromodulus(hypothesis: Hypothesis, influence: &Influence, young: f64, horizon: f64) -> f64 {
     let d = hypothesis.dimension() as f64;
     let Stiffness { c11, c12 } = hypothesis.stiffness(young);
     2.0 * d * (c11 + (d - 1.0) * c12) / hypothesis.stretch_moment(influence, horizon)
@@ -268,10 +250,7 @@ mod tests {
 
     fn assert_near(value: f64, expected: f64, tolerance: f64, label: &str) {
         let error = (value - expected).abs() / expected.abs();
-        assert!(
-            error < tolerance,
-            "{label}: {value} against {expected}, relative {error:.1e}"
-        );
+        assert!(error < tolerance, "{label}: {value} against {expected}, relative {error:.1e}");
     }
 
     /// Printed closed forms as (influence, c δ^(D+1)/E, s₀² E δ/G₀). Bar, constant and linear rows
@@ -328,12 +307,7 @@ mod tests {
                 let power = hypothesis.dimension() as i32 + 1;
                 assert_near(c, modulus * YOUNG / HORIZON.powi(power), 1e-12, &label);
                 let s0 = critical_stretch(hypothesis, &influence, c, FRACTURE_ENERGY, HORIZON);
-                assert_near(
-                    s0 * s0,
-                    stretch_squared * FRACTURE_ENERGY / (YOUNG * HORIZON),
-                    1e-12,
-                    &label,
-                );
+                assert_near(s0 * s0, stretch_squared * FRACTURE_ENERGY / (YOUNG * HORIZON), 1e-12, &label);
             }
         }
     }
@@ -345,12 +319,7 @@ mod tests {
         let (hypothesis, influence) = (Hypothesis::PlaneStress, Influence::Constant);
         let c = micromodulus(hypothesis, &influence, YOUNG, HORIZON);
         assert_near(c, 2.062648e20, 3e-7, "c");
-        assert_near(
-            critical_stretch(hypothesis, &influence, c, FRACTURE_ENERGY, HORIZON),
-            2.714621e-4,
-            2e-7,
-            "s0",
-        );
+        assert_near(critical_stretch(hypothesis, &influence, c, FRACTURE_ENERGY, HORIZON), 2.714621e-4, 2e-7, "s0");
     }
 
     /// Energy density of the bonds for the diagonal strain ε, (c/4) ∫ ω s² |ξ| dV with s = n·ε·n,
@@ -359,21 +328,11 @@ mod tests {
         let stretch = |n: [f64; 3]| (0..3).map(|i| strain[i] * n[i] * n[i]).sum::<f64>();
         let angular = match hypothesis.dimension() {
             1 => 2.0 * stretch([1.0, 0.0, 0.0]).powi(2),
-            2 => integrate(
-                |a| stretch([a.cos(), a.sin(), 0.0]).powi(2),
-                0.0,
-                2.0 * PI,
-                40,
-            ),
+            2 => integrate(|a| stretch([a.cos(), a.sin(), 0.0]).powi(2), 0.0, 2.0 * PI, 40),
             _ => integrate(
                 |z: f64| {
                     let rho = (1.0 - z * z).sqrt();
-                    integrate(
-                        |a| stretch([rho * a.cos(), rho * a.sin(), z]).powi(2),
-                        0.0,
-                        2.0 * PI,
-                        40,
-                    )
+                    integrate(|a| stretch([rho * a.cos(), rho * a.sin(), z]).powi(2), 0.0, 2.0 * PI, 40)
                 },
                 -1.0,
                 1.0,
@@ -392,17 +351,11 @@ mod tests {
                 let Stiffness { c11, c12 } = hypothesis.stiffness(YOUNG);
                 // Uniaxial, isotropic, pure shear in principal axes, and one of no symmetry; energy
                 // by quadrature.
-                for strain in [
-                    [1.0, 0.0, 0.0],
-                    [1.0, 1.0, 1.0],
-                    [1.0, -1.0, 0.0],
-                    [0.3, -0.7, 1.1],
-                ] {
+                for strain in [[1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [1.0, -1.0, 0.0], [0.3, -0.7, 1.1]] {
                     let mut strain = strain;
                     strain[hypothesis.dimension()..].fill(0.0);
                     let [x, y, z] = strain;
-                    let classical =
-                        0.5 * c11 * (x * x + y * y + z * z) + c12 * (x * y + y * z + z * x);
+                    let classical = 0.5 * c11 * (x * x + y * y + z * z) + c12 * (x * y + y * z + z * x);
                     let bonds = bond_energy(hypothesis, &influence, c, strain);
                     let label = format!("{} {} {strain:?}", hypothesis.name(), influence.name());
                     assert_near(bonds, classical, 1e-12, &label);
@@ -441,12 +394,7 @@ mod tests {
                 let label = format!("{} {}", hypothesis.name(), influence.name());
                 let c = micromodulus(hypothesis, &influence, YOUNG, HORIZON);
                 let s0 = critical_stretch(hypothesis, &influence, c, FRACTURE_ENERGY, HORIZON);
-                assert_near(
-                    plane_energy(hypothesis, &influence, c, s0),
-                    FRACTURE_ENERGY,
-                    1e-12,
-                    &label,
-                );
+                assert_near(plane_energy(hypothesis, &influence, c, s0), FRACTURE_ENERGY, 1e-12, &label);
                 let inverse = fracture_energy(hypothesis, &influence, c, s0, HORIZON);
                 assert_near(inverse, FRACTURE_ENERGY, 1e-14, &label);
             }
@@ -473,8 +421,7 @@ mod tests {
                     }
                     let bonds = c * ball_moment(&influence, exponents, 3.0, HORIZON);
                     // ∂ₐ∂_b of xₖ xₗ is δₐₖ δ_bₗ + δₐₗ δ_bₖ.
-                    let second =
-                        |a: usize, b: usize| delta(a, k) * delta(b, l) + delta(a, l) * delta(b, k);
+                    let second = |a: usize, b: usize| delta(a, k) * delta(b, l) + delta(a, l) * delta(b, k);
                     let laplacian: f64 = (0..D).map(|a| second(a, a)).sum();
                     let navier = (lambda + mu) * second(i, j) + mu * delta(i, j) * laplacian;
                     assert!(
@@ -502,40 +449,18 @@ mod tests {
         // 3159 m/s is the quoted Rayleigh speed of this glass.
         let rayleigh = rayleigh_speed(Hypothesis::Solid, YOUNG, density).unwrap();
         assert!((rayleigh - 3159.0).abs() < 0.5, "{rayleigh}");
-        for hypothesis in [
-            Hypothesis::PlaneStress,
-            Hypothesis::PlaneStrain,
-            Hypothesis::Solid,
-        ] {
+        for hypothesis in [Hypothesis::PlaneStress, Hypothesis::PlaneStrain, Hypothesis::Solid] {
             // C₁₁ = 3 C₁₂ and G = C₁₂ without exception, and then v² = (2 − 2/√3) c_s² in closed
             // form.
             let shear = shear_speed(hypothesis, YOUNG, density).unwrap();
-            assert_near(
-                longitudinal_speed(hypothesis, YOUNG, density),
-                3f64.sqrt() * shear,
-                1e-14,
-                "longitudinal",
-            );
+            assert_near(longitudinal_speed(hypothesis, YOUNG, density), 3f64.sqrt() * shear, 1e-14, "longitudinal");
             let closed = (2.0 - 2.0 / 3f64.sqrt()).sqrt() * shear;
-            assert_near(
-                rayleigh_speed(hypothesis, YOUNG, density).unwrap(),
-                closed,
-                1e-14,
-                "Rayleigh",
-            );
+            assert_near(rayleigh_speed(hypothesis, YOUNG, density).unwrap(), closed, 1e-14, "Rayleigh");
         }
         assert_near(bar_speed(YOUNG, density), 5432.144, 1e-6, "bar");
-        assert_eq!(
-            longitudinal_speed(Hypothesis::Bar, YOUNG, density),
-            bar_speed(YOUNG, density)
-        );
+        assert_eq!(longitudinal_speed(Hypothesis::Bar, YOUNG, density), bar_speed(YOUNG, density));
         assert_eq!(rayleigh_speed(Hypothesis::Bar, YOUNG, density), None);
         // An incompressible solid: v = 0.955313 c_s.
-        assert_near(
-            rayleigh_speed_between(1e9, 1.0),
-            0.955_312_5,
-            1e-6,
-            "incompressible",
-        );
+        assert_near(rayleigh_speed_between(1e9, 1.0), 0.955_312_5, 1e-6, "incompressible");
     }
 }
