@@ -144,8 +144,12 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
 
     /// Stops on values that are not finite, and on kinetic energy that nothing can have put in.
     fn watch(&self, kinetic: f64, clock: &Clock) -> Result<()> {
-        let stable = self.stable_step();
         let cause = || {
+            let stable = self.stable_step();
+            let profiles = self.loads.iter().map(|l| &l.profile).chain(self.prescribed.iter().map(|p| &p.profile));
+            if let Some((formula, value)) = profiles.filter_map(|p| p.first_bad().map(|b| (p.source(), b.1))).next() {
+                return format!("the formula `{formula}` of a condition gave {value}");
+            }
             if clock.dt > stable {
                 format!("the time step {:.3e} s is above the stable step {stable:.3e} s", clock.dt)
             } else {

@@ -41,6 +41,11 @@ impl Profile {
         &self.values
     }
 
+    /// The place in the set of the first value of the last evaluation that is not finite, and the value.
+    pub fn first_bad(&self) -> Option<(usize, f64)> {
+        self.values.iter().copied().enumerate().find(|(_, v)| !v.is_finite())
+    }
+
     /// The formula as the user wrote it.
     pub fn source(&self) -> &str {
         self.expression.source()
