@@ -22,6 +22,22 @@ pub struct DiscreteModuli {
     pub fracture_energy: f64,
 }
 
+/// Hypothesis, m, then C₁₁, C₁₂, W/G₀ with full volumes and the same with the ramp; constant
+/// influence.
+pub(super) type Tabulated = (Hypothesis, f64, [f64; 3], [f64; 3]);
+
+/// Own numbers from an independent script, to the four digits kept; 1e-4 is their last digit.
+pub(super) const TABLE: [Tabulated; 8] = [
+    (Hypothesis::PlaneStress, 2.0, [1.1800, 0.6752, 0.9786], [1.1172, 1.0359, 1.1712]),
+    (Hypothesis::PlaneStress, 3.0, [1.0528, 1.0051, 1.0261], [1.0327, 0.9825, 1.0342]),
+    (Hypothesis::PlaneStress, 4.0, [0.9743, 0.9266, 0.9290], [1.0158, 1.0037, 1.0210]),
+    (Hypothesis::PlaneStress, 5.0, [1.0271, 1.1164, 1.0696], [1.0176, 1.0121, 1.0239]),
+    (Hypothesis::PlaneStress, 6.0, [0.9905, 1.0239, 0.9960], [1.0080, 0.9996, 1.0091]),
+    (Hypothesis::PlaneStress, 8.0, [0.9648, 0.9858, 0.9590], [1.0009, 0.9941, 0.9988]),
+    (Hypothesis::Solid, 3.0, [1.0564, 1.2175, 1.1477], [1.0703, 1.0500, 1.0712]),
+    (Hypothesis::Solid, 4.0, [0.9343, 0.9566, 0.9133], [1.0274, 1.0256, 1.0300]),
+];
+
 /// Discrete moduli and fracture energy for the horizon ratio `m` = δ/h.
 ///
 /// ```text
@@ -88,22 +104,6 @@ fn lattice_points<const D: usize>(rule: PartialVolume, m: f64) -> impl Iterator<
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Hypothesis, m, then C₁₁, C₁₂, W/G₀ with full volumes and the same with the ramp; constant
-    /// influence.
-    type Row = (Hypothesis, f64, [f64; 3], [f64; 3]);
-
-    /// Own numbers from an independent script, to the four digits kept; 1e-4 is their last digit.
-    const TABLE: [Row; 8] = [
-        (Hypothesis::PlaneStress, 2.0, [1.1800, 0.6752, 0.9786], [1.1172, 1.0359, 1.1712]),
-        (Hypothesis::PlaneStress, 3.0, [1.0528, 1.0051, 1.0261], [1.0327, 0.9825, 1.0342]),
-        (Hypothesis::PlaneStress, 4.0, [0.9743, 0.9266, 0.9290], [1.0158, 1.0037, 1.0210]),
-        (Hypothesis::PlaneStress, 5.0, [1.0271, 1.1164, 1.0696], [1.0176, 1.0121, 1.0239]),
-        (Hypothesis::PlaneStress, 6.0, [0.9905, 1.0239, 0.9960], [1.0080, 0.9996, 1.0091]),
-        (Hypothesis::PlaneStress, 8.0, [0.9648, 0.9858, 0.9590], [1.0009, 0.9941, 0.9988]),
-        (Hypothesis::Solid, 3.0, [1.0564, 1.2175, 1.1477], [1.0703, 1.0500, 1.0712]),
-        (Hypothesis::Solid, 4.0, [0.9343, 0.9566, 0.9133], [1.0274, 1.0256, 1.0300]),
-    ];
 
     #[test]
     fn discrete_moduli_and_fracture_energies_are_the_tabulated_ones() {

@@ -3,12 +3,20 @@
 //! A study prints what is published or exact beside what was obtained, the difference, the tolerance and where the
 //! tolerance comes from, and plots itself. `bondwise verify` runs them; tests assert that they pass.
 
+mod constants;
+mod crack_branching;
 pub mod discrete;
+mod discrete_moduli;
+mod family_counts;
+mod fracture_work;
+mod navier;
 
 use serde::Serialize;
 
-use crate::error::Result;
+use crate::case::{Case, Options, build, bundled, read_text};
+use crate::error::{Error, Result};
 use crate::output::picture::Image;
+use crate::simulation::Simulation;
 
 /// A verification study.
 #[derive(Clone, Copy)]
@@ -24,7 +32,49 @@ pub struct Study {
 }
 
 /// All studies, in reading order.
-pub const STUDIES: &[Study] = &[];
+pub const STUDIES: &[Study] = &[
+    Study {
+        name: "constants",
+        about: "micromodulus and critical stretch of every hypothesis and influence function, by quadrature",
+        heavy: false,
+        run: constants::run,
+    },
+    Study {
+        name: "navier",
+        about: "the local limit is the Navier operator with the Poisson ratio of the theory",
+        heavy: false,
+        run: navier::run,
+    },
+    Study {
+        name: "family-counts",
+        about: "neighbours of a point, in 2D and 3D, with both partial-volume rules",
+        heavy: false,
+        run: family_counts::run,
+    },
+    Study {
+        name: "discrete-moduli",
+        about: "moduli and fracture energy of the scheme at finite spacing",
+        heavy: false,
+        run: discrete_moduli::run,
+    },
+    Study {
+        name: "crack-branching",
+        about: "a crack that branches in glass: broken bonds, tip, branching point, symmetry, energies",
+        heavy: false,
+        run: crack_branching::run,
+    },
+    Study {
+        name: "fracture-work",
+        about: "a crack driven slowly through a strip takes the fracture energy for each new area",
+        heavy: false,
+        run: fracture_work::run,
+    },
+];
+
+/// The study of that name.
+pub fn find(name: &str) -> Option<&'static Study> {
+    STUDIES.iter().find(|study| study.name == name)
+}
 
 /// What a study found.
 #[derive(Debug, Clone, Default)]
@@ -93,7 +143,22 @@ impl Row {
 }
 
 impl Outcome {
+    /// An outcome without rows has shown nothing and does not pass.
     pub fn passes(&self) -> bool {
-        self.rows.iter().all(Row::passes)
+        !self.rows.is_empty() && self.rows.iter().all(Row::passes)
     }
+}
+
+/// A case from its text, ready to be stepped; studies write no files.
+fn simulation(name: &str, text: &str, overrides: &[(&str, &str)]) -> Result<Simulation> {
+    let overrides: Vec<_> = overrides.iter().map(|(k, v)| ((*k).to_string(), (*v).to_string())).collect();
+    let case = read_text::<Case>(name, text, &overrides).map_err(Error::Case)?;
+    build(&case, &Options::default())
+}
+
+/// A bundled case, ready to be stepped.
+fn bundled_simulation(name: &str) -> Result<Simulation> {
+    let case = bundled::CASES.iter().find(|case| case.name == name);
+    let case = case.ok_or_else(|| Error::Refused(format!("no bundled case is called `{name}`")))?;
+    simulation(name, case.case, &[])
 }

@@ -1,0 +1,81 @@
+//! The quick verification studies pass, and a comparison that fails is seen to fail.
+
+use bondwise::verify::{Measure, Outcome, Row, STUDIES, find};
+
+/// Runs a study and names every row that does not pass.
+fn passes(name: &str) {
+    let study = find(name).expect("a study of that name");
+    let outcome = (study.run)(false).expect("the study runs");
+    let failed: Vec<_> = outcome
+        .rows
+        .iter()
+        .filter(|row| !row.passes())
+        .map(|row| format!("{}: {} against {}", row.what, row.obtained, row.expected))
+        .collect();
+    assert!(failed.is_empty(), "{name}: {failed:#?}");
+    assert!(outcome.passes(), "{name}: no rows");
+}
+
+#[test]
+fn constants_are_the_integrals_that_define_them() {
+    passes("constants");
+}
+
+#[test]
+fn the_local_limit_is_the_navier_operator() {
+    passes("navier");
+}
+
+#[test]
+fn families_have_the_counted_sizes() {
+    passes("family-counts");
+}
+
+#[test]
+fn the_scheme_has_the_tabulated_moduli_and_fracture_energies() {
+    passes("discrete-moduli");
+}
+
+#[test]
+fn a_crack_branches_as_in_the_reference_run() {
+    passes("crack-branching");
+}
+
+#[test]
+fn a_crack_takes_the_fracture_energy_for_each_new_area() {
+    passes("fracture-work");
+}
+
+#[test]
+fn names_of_studies_are_distinct_and_written_as_on_the_command_line() {
+    for (k, study) in STUDIES.iter().enumerate() {
+        assert!(study.name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-'), "{}", study.name);
+        assert!(STUDIES[..k].iter().all(|other| other.name != study.name), "{}", study.name);
+    }
+}
+
+/// The canary: what must not pass, does not.
+#[test]
+fn a_row_outside_its_tolerance_or_not_a_number_fails() {
+    let row = |expected, obtained, tolerance, measure| Row::new("canary", expected, obtained, tolerance, measure, "");
+    let all = [Measure::Absolute, Measure::Relative, Measure::AtMost, Measure::AtLeast];
+    for measure in all {
+        assert!(row(2.0, 2.0, 1e-12, measure).passes(), "{measure:?}");
+        assert!(!row(2.0, f64::NAN, f64::INFINITY, measure).passes(), "{measure:?}");
+        assert!(!row(f64::NAN, 2.0, f64::INFINITY, measure).passes(), "{measure:?}");
+    }
+    assert!(!row(2.0, 2.2, 0.1, Measure::Absolute).passes());
+    assert!(!row(2.0, 1.8, 0.1, Measure::Absolute).passes());
+    assert!(!row(200.0, 203.0, 0.01, Measure::Relative).passes());
+    assert!(!row(-200.0, -203.0, 0.01, Measure::Relative).passes());
+    assert!(!row(0.0, 1.0, 0.01, Measure::Relative).passes());
+    assert!(!row(2.0, 2.1, 9.0, Measure::AtMost).passes());
+    assert!(!row(2.0, 1.9, 9.0, Measure::AtLeast).passes());
+    assert!(!row(2.0, 2.0, f64::NAN, Measure::Absolute).passes());
+
+    let good = row(2.0, 2.0, 0.0, Measure::Absolute);
+    let bad = row(2.0, f64::NAN, 0.0, Measure::Absolute);
+    assert!(Outcome { rows: vec![good.clone()], ..Outcome::default() }.passes());
+    assert!(!Outcome { rows: vec![good, bad], ..Outcome::default() }.passes());
+    assert!(!Outcome::default().passes(), "nothing was compared");
+}
