@@ -3,6 +3,7 @@
 //! It also keeps the books: work and impulse of everything from outside, energy lost to broken bonds and damping, so
 //! that a wrong run is seen at once.
 
+use crate::conditions::prescribed::Step;
 use crate::conditions::{Load, Prescribed};
 use crate::error::{Error, NumericalStop, Result};
 use crate::execution::Exec;
@@ -25,6 +26,8 @@ pub struct Problem<const D: usize, L> {
     pub n_cut: u64,
     exec: Exec,
     ledger: Ledger,
+    /// c of the solver in use, 1/s: the books need it.
+    damping: f64,
 }
 
 /// What came in and what was lost since the start.
@@ -36,6 +39,7 @@ struct Ledger {
     impulse: [f64; 3],
     initial_momentum: [f64; 3],
     kinetic: f64,
+    momentum: [f64; 3],
 }
 
 /// The energies (J; J/m of thickness in 2D, J of a unit cross-section in 1D) and momenta of a body at one instant.
@@ -88,7 +92,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
         let n_bonds = state.states.count() + n_cut;
         physics.bonded_volume(&body, &mut exec, &BondStates::whole(&body), &mut family_volume);
         let ledger = Ledger::default();
-        Problem { body, physics, state, prescribed, loads, family_volume, n_bonds, n_cut, exec, ledger }
+        Problem { body, physics, state, prescribed, loads, family_volume, n_bonds, n_cut, exec, ledger, damping: 0.0 }
     }
 
     /// Evaluates the forces at the start and opens the books.
@@ -112,34 +116,42 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
         self.ledger.impulse = [0.0; 3];
         self.ledger.external = 0.0;
         self.ledger.kinetic = now.kinetic;
+        self.ledger.momentum = now.momentum;
     }
 
     /// One step of velocity Verlet, then the watch over its result.
     pub fn step(&mut self, solver: &VelocityVerlet, clock: &mut Clock) -> Result<()> {
+        self.damping = solver.damping;
         solver.step(self, clock);
-        let before = self.ledger.kinetic;
-        let kinetic = self.kinetic();
-        self.ledger.kinetic = kinetic;
-        // Damping takes ρ c v² a second: trapezoidal in time, as the forces.
-        self.ledger.damped += solver.damping * clock.dt * (before + kinetic);
+        let (kinetic, momentum) = self.motion();
+        let ledger = &mut self.ledger;
+        // Damping takes ρ c v² a second, and ρ c v of momentum: trapezoidal in time, as the forces.
+        ledger.damped += solver.damping * clock.dt * (ledger.kinetic + kinetic);
+        for d in 0..3 {
+            ledger.impulse[d] -= 0.5 * solver.damping * clock.dt * (ledger.momentum[d] + momentum[d]);
+        }
+        (ledger.kinetic, ledger.momentum) = (kinetic, momentum);
         self.watch(kinetic, clock)
     }
 
-    fn kinetic(&mut self) -> f64 {
+    /// Kinetic energy and momentum.
+    fn motion(&mut self) -> (f64, [f64; 3]) {
         let (cloud, velocity) = (&self.body.cloud, components::<D>(&self.state.velocity));
-        let half_density = 0.5 * self.physics.density;
-        self.exec.sum(cloud.n_points(), |points| {
-            let mut sum = 0.0;
+        let density = self.physics.density;
+        let [square, px, py, pz] = self.exec.sum(cloud.n_points(), |points| {
+            let mut sum = [0.0; 4];
             for &slot in &cloud.slots[points] {
                 let slot = slot as usize;
-                let mut square = 0.0;
-                for v in velocity {
-                    square += v[slot] * v[slot];
+                let mass = density * cloud.volume(slot);
+                for d in 0..D {
+                    let v = velocity[d][slot];
+                    sum[0] += mass * v * v;
+                    sum[d + 1] += mass * v;
                 }
-                sum += square * cloud.volume(slot);
             }
-            [half_density * sum, 0.0, 0.0, 0.0]
-        })[0]
+            sum
+        });
+        (0.5 * square, [px, py, pz])
     }
 
     /// Stops on values that are not finite, and on kinetic energy that nothing can have put in.
@@ -204,7 +216,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
         let mut density = vec![0.0; self.body.cloud.n_slots()];
         self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
         let (cloud, rho) = (&self.body.cloud, self.physics.density);
-        let (u, v) = (components::<D>(&self.state.displacement), components::<D>(&self.state.velocity));
+        let v = components::<D>(&self.state.velocity);
         let n = cloud.n_points();
         let [strain, scale, ..] = self.exec.sum(n, |points| {
             let (mut strain, mut scale) = (0.0, 0.0);
@@ -216,20 +228,13 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
             }
             [strain, scale, 0.0, 0.0]
         });
+        let (kinetic, momentum) = self.motion();
+        let (cloud, u) = (&self.body.cloud, components::<D>(&self.state.displacement));
+        let v = components::<D>(&self.state.velocity);
         let momentum_of = |slot: usize| -> [f64; 3] {
             let mass = rho * cloud.volume(slot);
             embed::<D>(&std::array::from_fn(|d| mass * v[d][slot]))
         };
-        let sums = self.exec.sum(n, |points| {
-            let mut sum = [0.0; 4];
-            for &slot in &cloud.slots[points] {
-                let p = momentum_of(slot as usize);
-                for d in 0..3 {
-                    sum[d] += p[d];
-                }
-            }
-            sum
-        });
         let angular = self.exec.sum(n, |points| {
             let mut sum = [0.0; 4];
             for &slot in &cloud.slots[points] {
@@ -244,8 +249,6 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
             }
             sum
         });
-        let momentum = [sums[0], sums[1], sums[2]];
-        let kinetic = self.kinetic();
         let ledger = &self.ledger;
         let defect: f64 = (0..3).map(|d| (momentum[d] - ledger.initial_momentum[d] - ledger.impulse[d]).powi(2)).sum();
         Balance {
@@ -344,7 +347,8 @@ impl<const D: usize, L: BondLaw<D>> System for Problem<D, L> {
                 Stage::Finish => {
                     let force = components::<D>(force)[c];
                     let cloud = &self.body.cloud;
-                    let done = p.finish(t, dt, self.physics.density, u, v, force, |slot| cloud.volume(slot));
+                    let step = Step { t, dt, inertia: self.physics.density, damping: self.damping };
+                    let done = p.finish(&step, u, v, force, |slot| cloud.volume(slot));
                     self.ledger.external += done.work;
                     self.ledger.impulse[c] += done.impulse;
                 }

@@ -14,6 +14,18 @@ pub enum Quantity {
     Velocity,
 }
 
+/// The step that a constraint looks back on.
+#[derive(Debug, Clone, Copy)]
+pub struct Step {
+    /// Time at its end, s.
+    pub t: f64,
+    pub dt: f64,
+    /// ρ, kg/m³
+    pub inertia: f64,
+    /// c, 1/s
+    pub damping: f64,
+}
+
 /// One component of the motion of a set, given as a formula, until it is released.
 #[derive(Debug, Clone)]
 pub struct Prescribed {
@@ -50,18 +62,18 @@ impl Prescribed {
         }
     }
 
-    /// Sets the velocities at the end of the step, t, and accounts for the reaction over the step: its impulse is the
-    /// change of momentum less the impulse of all other forces, its work the change of kinetic energy less theirs.
+    /// Sets the velocities at the end of the step and accounts for the reaction over the step: its impulse is the change
+    /// of momentum less the impulse of all other forces, its work the change of kinetic energy less theirs. Damping, an
+    /// inner force −ρ c v, counts among the others by the trapezoidal rule, as velocity Verlet applies it.
     pub fn finish(
         &mut self,
-        t: f64,
-        dt: f64,
-        inertia: f64,
+        step: &Step,
         displacement: &[f64],
         velocity: &mut [f64],
         force: &[f64],
         volume: impl Fn(usize) -> f64,
     ) -> Done {
+        let Step { t, dt, inertia, damping } = *step;
         let mut done = Done::default();
         if t > self.until {
             self.reaction = 0.0;
@@ -86,8 +98,10 @@ impl Prescribed {
             let (u, v, f) = (displacement[slot], velocity[slot], force[slot]);
             let [u_last, v_last, f_last] = *last;
             let mean = 0.5 * (f + f_last);
-            done.impulse += (inertia * (v - v_last) - mean * dt) * volume(slot);
-            done.work += (0.5 * inertia * (v * v - v_last * v_last) - mean * (u - u_last)) * volume(slot);
+            let damped = 0.5 * inertia * damping * dt;
+            done.impulse += (inertia * (v - v_last) + damped * (v + v_last) - mean * dt) * volume(slot);
+            let kinetic = 0.5 * inertia * (v * v - v_last * v_last);
+            done.work += (kinetic + damped * (v * v + v_last * v_last) - mean * (u - u_last)) * volume(slot);
             *last = [u, v, f];
         }
         self.reaction = done.impulse / dt;
