@@ -1654,7 +1654,7 @@ mod tests {
         for piece in ["(", "-", "!", "not ", "2^", "sin(", "if(1,", "x+", "[", "é", "\0", "("] {
             let error = failure(&piece.repeat(200_000));
             assert_eq!(error.message, "the expression is longer than 4096 characters");
-            assert_eq!(error.start, piece.repeat(4096).chars().take(4096).map(char::len_utf8).sum());
+            assert_eq!(error.start, piece.repeat(4096).chars().take(4096).map(char::len_utf8).sum::<usize>());
         }
         for piece in ["(", "-", "+", "!", "not ", "2^", "2^-", "sin(", "if(1,", "clamp(x, 0, ", "1+("] {
             let error = failure(&format!("{}x", piece.repeat(4095 / piece.len())));
