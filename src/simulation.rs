@@ -180,7 +180,14 @@ pub fn prepare_folder(folder: &Path, overwrite: bool) -> Result<()> {
             }
         }
     }
-    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))
+    if folder.exists() && !folder.is_dir() {
+        return Err(Error::Refused(format!(
+            "{}: is a file, where a folder for the results is wanted\n    help: name another with --out",
+            folder.display()
+        )));
+    }
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Error::Refused(format!("{}: the folder for the results cannot be made: {e}", folder.display())))
 }
 
 /// A problem together with what its writers ask for again and again.

@@ -37,6 +37,21 @@ fn the_scheme_has_the_tabulated_moduli_and_fracture_energies() {
 }
 
 #[test]
+fn a_pulse_runs_along_a_bar_at_its_speed() {
+    passes("wave-in-bar");
+}
+
+#[test]
+fn plane_waves_disperse_as_the_integral_says() {
+    passes("dispersion");
+}
+
+#[test]
+fn energy_does_not_drift() {
+    passes("energy-drift");
+}
+
+#[test]
 fn a_crack_branches_as_in_the_reference_run() {
     passes("crack-branching");
 }

@@ -8,12 +8,13 @@ use std::time::Instant;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
+use super::bundled;
 use super::check::check;
 use super::diagnostics::{Diagnostic, Severity};
 use super::import;
 use super::model::{
-    self, Axis, BondBased, Case, Condition, FieldName, Formula, InfluenceFunction, Law, Motion, Output, PartialVolumes,
-    Plane, Region, Solver,
+    self, Axis, BondBased, Case, FieldName, Formula, InfluenceFunction, Law, Motion, Output, PartialVolumes, Plane,
+    Region, Solver,
 };
 use super::read::{Located, Source};
 use crate::conditions::load::Scale;
@@ -21,7 +22,7 @@ use crate::conditions::profile::VARIABLES;
 use crate::conditions::{Load, Prescribed, Profile, Quantity, initial};
 use crate::discretization::{Influence, Operator, PartialVolume, standard};
 use crate::error::{Error, Result};
-use crate::expression::Expression;
+use crate::expression::{Expression, nearest};
 use crate::family::BondLaw;
 use crate::field::{Vector, components_mut};
 use crate::geometry::{Arrangement, Cloud, Crack, Shape};
@@ -55,6 +56,8 @@ pub struct Options {
 
 /// Largest number of files that one output may write without being asked twice.
 const MANY_FILES: u64 = 100_000;
+/// Largest number of steps: more would take this machine longer than anybody waits.
+const MANY_STEPS: f64 = 1e15;
 /// Damage above which a point counts as damaged, where the case says nothing.
 const DAMAGED: f64 = 0.35;
 /// Steps between history rows, where the case says nothing.
@@ -146,14 +149,15 @@ impl<const D: usize> Builder<'_, D> {
                     Motion::Displacement { component, value } => (&mut state.displacement, *component, value),
                     Motion::Velocity { component, value } => (&mut state.velocity, *component, value),
                 };
-                let mut profile = self.profile(value, &body.cloud, &slots)?;
+                let path = format!("conditions[{k}].initial.{}.value", motion_name(motion));
+                let mut profile = self.profile(value, &body.cloud, &slots, &path)?;
                 initial::apply(components_mut::<D>(flat)[component], &slots, &mut profile);
             }
             if let Some(motion) = &condition.prescribe {
-                prescribed.push(self.prescribed(condition, motion, &body.cloud, slots.clone())?);
+                prescribed.push(self.prescribed(k, motion, &body.cloud, slots.clone())?);
             }
             if let Some(load) = &condition.load {
-                self.load(condition, load, &body.cloud, shape.as_ref(), &slots, &mut loads)?;
+                self.load(k, load, &body.cloud, shape.as_ref(), &slots, &mut loads)?;
             }
         }
         let stable_step = physics.stable_step(&body);
@@ -199,8 +203,9 @@ impl<const D: usize> Builder<'_, D> {
                 (solver.end_time / n, n)
             }
         };
-        if n_steps > 1e15 {
-            let message = format!("{n_steps:.3e} steps of {dt:.3e} s");
+        if n_steps > MANY_STEPS {
+            let message =
+                format!("this would take {n_steps:.3e} steps of {dt:.3e} s; at most {MANY_STEPS:.0e} are taken");
             return Err(self.refuse("solver.velocity_verlet.end_time", message, "is the unit right?"));
         }
         let n_steps = n_steps as u64;
@@ -352,7 +357,12 @@ impl<const D: usize> Builder<'_, D> {
         let Some(model::Points::Csv { file }) = &geometry.points else {
             return Err(Error::Refused("a case has a shape or points".into()));
         };
-        let points = import::csv::read::<D>(&self.options.base.join(file))?;
+        let path = self.options.base.join(file);
+        if !path.exists() {
+            let help = "the path is relative to the folder of the case file";
+            return Err(self.refuse("geometry.points.csv.file", format!("there is no file {}", path.display()), help));
+        }
+        let points = import::csv::read::<D>(&path)?;
         let mut cloud = Cloud::scattered(points.positions, points.volumes);
         for (name, members) in points.sets {
             cloud.sets.insert(name, members);
@@ -366,7 +376,7 @@ impl<const D: usize> Builder<'_, D> {
         let ratio = d.horizon_ratio.or(d.horizon.map(|h| h / spacing)).unwrap_or(1.0);
         if ratio > 100.0 {
             let message = format!("the horizon is {ratio:.1} spacings; at most 100 are allowed");
-            return Err(self.refuse("discretization", message, "a ratio of 3 to 5 is usual"));
+            return Err(self.refuse("discretization.horizon", message, "a ratio of 3 to 5 is usual"));
         }
         Ok(rule.reach::<D>(spacing, ratio * spacing) / spacing + 1.0)
     }
@@ -405,15 +415,15 @@ impl<const D: usize> Builder<'_, D> {
         if points >= f64::from(u32::MAX) || bytes > available {
             let fit = (available / per_point).min(f64::from(u32::MAX));
             let coarser = spacing * (points / fit).powf(1.0 / D as f64);
-            return Err(Error::TooLarge(format!(
-                "{} points with {:.3e} bonds would take {:.1} GiB; {:.1} GiB are free here\n    help: about {:.2e} points fit: a spacing of {:.3e} m",
-                points,
+            let message = format!(
+                "{points:.3e} points with {:.3e} bonds would take {:.3e} GiB; {:.1} GiB are free here",
                 points * family,
                 bytes / 1073741824.0,
                 available / 1073741824.0,
-                fit,
-                coarser * 1.05,
-            )));
+            );
+            let help = format!("about {fit:.2e} points fit: a spacing of {:.3e} m", coarser * 1.05);
+            let diagnostic = self.source().error("geometry.spacing", message).help(help);
+            return Err(Error::TooLarge(diagnostic.to_string()));
         }
         Ok(())
     }
@@ -430,7 +440,11 @@ impl<const D: usize> Builder<'_, D> {
             let slots = cloud.select(|x| inside(x));
             if slots.is_empty() {
                 let (low, high) = cloud.bounds();
-                let message = format!("no point is in this set; the body's points span {low:?} to {high:?} m");
+                let message = format!(
+                    "no point is in this set; the points of the body span {} to {} m",
+                    rounded(&low),
+                    rounded(&high)
+                );
                 return Err(self.refuse(&path, message, "move or enlarge the region"));
             }
             found.insert(name.clone(), slots);
@@ -491,7 +505,8 @@ impl<const D: usize> Builder<'_, D> {
     fn slots(&self, name: &str, cloud: &Cloud<D>, path: &str) -> Result<Arc<[u32]>> {
         cloud.sets.get(name).cloned().ok_or_else(|| {
             let names: Vec<&str> = cloud.sets.iter().map(|(n, _)| n).collect();
-            self.refuse(path, format!("no set has this name; sets: {}", names.join(", ")), "")
+            let help = nearest(name, names.iter().copied()).map_or(String::new(), |n| format!("did you mean `{n}`?"));
+            self.refuse(path, format!("no set has this name; sets: {}", names.join(", ")), &help)
         })
     }
 
@@ -504,35 +519,31 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// The formula on the points of a set, refused if it has no finite value at one of them at t = 0.
-    fn profile(&self, formula: &Formula, cloud: &Cloud<D>, slots: &Arc<[u32]>) -> Result<Profile> {
+    fn profile(&self, formula: &Formula, cloud: &Cloud<D>, slots: &Arc<[u32]>, path: &str) -> Result<Profile> {
         let mut profile = Profile::new(self.expression(formula)?, cloud, slots);
         let bad = profile.at(0.0).iter().copied().enumerate().find(|(_, v)| !v.is_finite());
         if let Some((k, value)) = bad {
             let slot = slots[k] as usize;
             let point = cloud.slots.binary_search(&slots[k]).unwrap_or(k);
-            return Err(Error::Refused(format!(
-                "formula `{}`: {value} at t = 0 at point {point}, position {:?} m",
-                profile.source(),
-                cloud.position(slot)
-            )));
+            let position = rounded(&cloud.position(slot));
+            let message = format!("the formula is {value} at t = 0 at point {point}, position {position} m");
+            let help = "keep it finite everywhere in the set, as in `sqrt(max(x, 0))` or `if(x > 0, 1/x, 0)`";
+            return Err(self.refuse(path, message, help));
         }
         Ok(profile)
     }
 
-    fn prescribed(
-        &self,
-        condition: &Condition,
-        motion: &Motion,
-        cloud: &Cloud<D>,
-        slots: Arc<[u32]>,
-    ) -> Result<Prescribed> {
+    /// The motion of `conditions[k]`.
+    fn prescribed(&self, k: usize, motion: &Motion, cloud: &Cloud<D>, slots: Arc<[u32]>) -> Result<Prescribed> {
+        let condition = &self.case.value.conditions[k];
+        let path = format!("conditions[{k}].prescribe.{}.value", motion_name(motion));
         let (quantity, component, value) = match motion {
             Motion::Displacement { component, value } => (Quantity::Displacement, *component, value),
             Motion::Velocity { component, value } => (Quantity::Velocity, *component, value),
         };
         Ok(Prescribed {
             name: format!("{}_{}", condition.on, ["x", "y", "z"][component]),
-            profile: self.profile(value, cloud, &slots)?,
+            profile: self.profile(value, cloud, &slots, &path)?,
             slots,
             component,
             quantity,
@@ -542,18 +553,25 @@ impl<const D: usize> Builder<'_, D> {
         })
     }
 
+    /// The load of `conditions[k]`.
     fn load(
         &self,
-        condition: &Condition,
+        k: usize,
         load: &model::Load,
         cloud: &Cloud<D>,
         shape: Option<&Shape<D>>,
         slots: &Arc<[u32]>,
         loads: &mut Vec<Load>,
     ) -> Result<()> {
-        let until = condition.until.unwrap_or(f64::INFINITY);
+        let until = self.case.value.conditions[k].until.unwrap_or(f64::INFINITY);
+        let kind = match load {
+            model::Load::BodyForce { .. } => "body_force",
+            model::Load::Traction { .. } => "traction",
+            model::Load::Pressure { .. } => "pressure",
+        };
+        let path = format!("conditions[{k}].load.{kind}.value");
         let mut push = |component, value: &Formula, scale| -> Result<()> {
-            let profile = self.profile(value, cloud, slots)?;
+            let profile = self.profile(value, cloud, slots, &path)?;
             loads.push(Load { slots: slots.clone(), component, profile, scale, until, last: None });
             Ok(())
         };
@@ -604,6 +622,20 @@ impl<const D: usize> Builder<'_, D> {
             .map(Some)
             .map_err(|e| self.refuse(path, format!("failure rules: {e}"), ""))
     }
+}
+
+fn motion_name(motion: &Motion) -> &'static str {
+    match motion {
+        Motion::Displacement { .. } => "displacement",
+        Motion::Velocity { .. } => "velocity",
+    }
+}
+
+/// A position as `(-0.0095, 0.0045)`, without the digits that rounding left behind.
+fn rounded(x: &[f64]) -> String {
+    let parts: Vec<String> =
+        x.iter().map(|x| format!("{x:.6e}").parse::<f64>().map_or(String::new(), |x| x.to_string())).collect();
+    format!("({})", parts.join(", "))
 }
 
 fn tip_window(facts: &Facts) -> f64 {
@@ -717,7 +749,14 @@ pub fn available_memory() -> Option<u64> {
 /// Reads and builds a case file, or the `case.toml` of a folder.
 pub fn load(path: &Path, overrides: &[(String, String)], options: &Options) -> Result<Simulation> {
     let file = if path.is_dir() { path.join("case.toml") } else { path.to_path_buf() };
-    let case = super::read_file::<Case>(&file, overrides).map_err(Error::Case)?;
+    let mut case = super::read_file::<Case>(&file, overrides);
+    if let (Err(mistakes), Some(name)) = (&mut case, path.to_str())
+        && !path.exists()
+        && bundled::CASES.iter().any(|case| case.name == name)
+    {
+        mistakes.list[0].help = Some(format!("`bondwise new {name}` makes this case here"));
+    }
+    let case = case.map_err(Error::Case)?;
     let base = file.parent().map(Path::to_path_buf).unwrap_or_default();
     build(&case, &Options { base, ..options.clone() })
 }

@@ -10,10 +10,27 @@ pub struct Bundled {
     pub readme: &'static str,
 }
 
+/// A case by the name of its folder.
+macro_rules! bundled {
+    ($name:literal, $about:literal) => {
+        Bundled {
+            name: $name,
+            about: $about,
+            case: include_str!(concat!("../../cases/", $name, "/case.toml")),
+            readme: include_str!(concat!("../../cases/", $name, "/README.md")),
+        }
+    };
+}
+
 /// All of them, in the order in which a newcomer may look at them.
-pub const CASES: [Bundled; 1] = [Bundled {
-    name: "crack_branching",
-    about: "2D: a crack runs through glass and branches; the main example",
-    case: include_str!("../../cases/crack_branching/case.toml"),
-    readme: include_str!("../../cases/crack_branching/README.md"),
-}];
+pub const CASES: [Bundled; 9] = [
+    bundled!("crack_branching", "2D: a crack runs through glass and branches; the main example"),
+    bundled!("crack_branching_duran", "2D: the same plate in a tougher glass under a higher load"),
+    bundled!("wave_in_bar", "1D: a pulse against its closed form; the smallest case"),
+    bundled!("wave_in_bar_3d", "3D: a bar runs against a wall; a compression wave and its return"),
+    bundled!("plate_with_hole", "2D: a plate with a hole is pulled slowly until it rests"),
+    bundled!("kalthoff_winkler", "2D: a struck plate with two notches cracks at 70 degrees"),
+    bundled!("fragmenting_cylinder", "3D: an expanding tube breaks into fragments; scattered points"),
+    bundled!("kalthoff_winkler_3d", "3D: the struck plate with its thickness; large"),
+    bundled!("crack_branching_3d", "3D: the branching crack with its thickness; large"),
+];

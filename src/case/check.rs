@@ -32,17 +32,15 @@ impl Checker<'_> {
     }
 
     /// Exactly one of two keys of a table.
-    fn either(&mut self, path: &str, a: (&str, bool), b: (&str, bool)) {
+    fn either(&mut self, path: &str, a: (&str, bool), b: (&str, bool), example: &str) {
         match (a.1, b.1) {
             (true, true) => {
-                self.error(
-                    path,
-                    format!("`{}` and `{}` are both given; only one may be", a.0, b.0),
-                    "remove one of them",
-                );
+                let message = format!("`{}` and `{}` are both given; only one may be", a.0, b.0);
+                self.error(&format!("{path}.{}", b.0), message, "remove one of them");
             }
             (false, false) => {
-                self.error(path, format!("neither `{}` nor `{}` is given; one must be", a.0, b.0), "");
+                let message = format!("neither `{}` nor `{}` is given; one must be", a.0, b.0);
+                self.error(path, message, &format!("add one of them, such as `{example}`"));
             }
             _ => {}
         }
@@ -74,9 +72,17 @@ impl Checker<'_> {
             let path = format!("conditions[{k}]");
             self.set_name(&condition.on, case, imported, &format!("{path}.on"), &mut used);
             let given = [condition.initial.is_some(), condition.prescribe.is_some(), condition.load.is_some()];
-            if given.iter().filter(|g| **g).count() != 1 {
-                let message = "a condition has exactly one of `initial`, `prescribe`, `load`";
-                self.error(&path, message, "give each its own [[conditions]] table");
+            match given.iter().filter(|g| **g).count() {
+                0 => {
+                    let message = "this condition does nothing: `initial`, `prescribe` or `load` is missing";
+                    let help = "add one, such as `initial = { velocity = { component = 0, value = 1.0 } }`";
+                    self.error(&path, message, help);
+                }
+                1 => {}
+                _ => {
+                    let message = "a condition has exactly one of `initial`, `prescribe`, `load`";
+                    self.error(&path, message, "give each its own [[conditions]] table");
+                }
             }
             if condition.initial.is_some() && condition.until.is_some() {
                 let message = "an initial value has no end: `until` belongs to `prescribe` and `load`";
@@ -105,22 +111,28 @@ impl Checker<'_> {
                 _ => {}
             }
         }
-        for name in case.sets.keys() {
-            if !used.contains(name.as_str()) {
-                self.warning(&format!("sets.{name}"), "this set is defined but never used");
-            }
-        }
         let Solver::VelocityVerlet(solver) = &case.solver;
         if solver.safety.is_some() && solver.time_step.is_some() {
             let path = "solver.velocity_verlet.time_step";
             self.error(path, "`safety` and `time_step` are both given; only one may be", "remove one of them");
         }
         self.outputs(case);
+        // Next to a mistake, such as a misspelt name, it would be an echo.
+        for name in case.sets.keys().filter(|_| self.list.is_empty()).cloned().collect::<Vec<_>>() {
+            if !used.contains(name.as_str()) {
+                self.warning(&format!("sets.{name}"), "this set is defined but never used");
+            }
+        }
     }
 
     fn geometry(&mut self, case: &Case) {
         let (geometry, dimension) = (&case.geometry, case.case.dimension);
-        self.either("geometry", ("shape", geometry.shape.is_some()), ("points", geometry.points.is_some()));
+        self.either(
+            "geometry",
+            ("shape", geometry.shape.is_some()),
+            ("points", geometry.points.is_some()),
+            "shape = { rectangle = { size = [0.1, 0.04] } }",
+        );
         if let Some(shape) = &geometry.shape {
             if geometry.spacing.is_none() {
                 self.error(
@@ -178,18 +190,24 @@ impl Checker<'_> {
 
     fn component(&mut self, component: usize, dimension: usize, path: &str) {
         if component >= dimension {
-            self.error(
-                path,
-                format!("component {component} does not exist in {dimension}D; 0 to {} do", dimension - 1),
-                "",
-            );
+            let known = ["0 is x", "1 is y", "2 is z"][..dimension].join(", ");
+            self.error(path, format!("there is no component {component} in {dimension}D"), &known);
+        }
+    }
+
+    fn size(&mut self, size: &[f64], path: &str) {
+        for (d, _) in size.iter().enumerate().filter(|(_, length)| **length <= 0.0) {
+            self.error(&format!("{path}[{d}]"), "a size must be above 0", "");
         }
     }
 
     fn shape(&mut self, shape: &Shape, dimension: usize, path: &str) {
         match shape {
             Shape::Segment { .. } => self.fits("segment", 1, dimension, path),
-            Shape::Rectangle { .. } => self.fits("rectangle", 2, dimension, path),
+            Shape::Rectangle { size, .. } => {
+                self.fits("rectangle", 2, dimension, path);
+                self.size(size, &format!("{path}.rectangle.size"));
+            }
             Shape::Disk { .. } => self.fits("disk", 2, dimension, path),
             Shape::Ring { .. } => self.fits("ring", 2, dimension, path),
             Shape::Polygon { vertices } => {
@@ -198,7 +216,10 @@ impl Checker<'_> {
                     self.vector(vertex, 2, &format!("{path}.polygon.vertices[{i}]"));
                 }
             }
-            Shape::Block { .. } => self.fits("block", 3, dimension, path),
+            Shape::Block { size, .. } => {
+                self.fits("block", 3, dimension, path);
+                self.size(size, &format!("{path}.block.size"));
+            }
             Shape::Sphere { .. } => self.fits("sphere", 3, dimension, path),
             Shape::Cylinder { .. } => self.fits("cylinder", 3, dimension, path),
             Shape::Tube { .. } => self.fits("tube", 3, dimension, path),
@@ -251,7 +272,12 @@ impl Checker<'_> {
 
     fn discretization(&mut self, case: &Case) {
         let d = &case.discretization;
-        self.either("discretization", ("horizon_ratio", d.horizon_ratio.is_some()), ("horizon", d.horizon.is_some()));
+        self.either(
+            "discretization",
+            ("horizon_ratio", d.horizon_ratio.is_some()),
+            ("horizon", d.horizon.is_some()),
+            "horizon_ratio = 3",
+        );
         if let (Some(horizon), Some(spacing)) = (d.horizon, case.geometry.spacing)
             && horizon < spacing
         {
@@ -281,10 +307,8 @@ impl Checker<'_> {
             // 1e-3 lets 0.333 stand for 1/3.
             if fixed.is_none_or(|fixed| (poisson - fixed).abs() > 1e-3) {
                 let message = match fixed {
-                    Some(_) => {
-                        format!("found {poisson}, but the bond-based law fixes the Poisson ratio at {name} {why}")
-                    }
-                    None => format!("found {poisson}, but {why}"),
+                    Some(_) => format!("the bond-based law fixes the Poisson ratio at {name} {why}"),
+                    None => why.to_owned(),
                 };
                 self.error(&format!("{path}.poisson"), message, "remove the key, or give that value");
             }
@@ -303,13 +327,19 @@ impl Checker<'_> {
             path,
             ("fracture_energy", failure.fracture_energy.is_some()),
             ("stretch", failure.stretch.is_some()),
+            "fracture_energy = \"3.8 J/m^2\"",
         );
         for (k, name) in failure.no_fail.iter().enumerate() {
             self.set_name(name, case, imported, &format!("{path}.no_fail[{k}]"), used);
         }
         for (k, FailurePair { between, fracture_energy, stretch }) in failure.pairs.iter().enumerate() {
             let path = format!("{path}.pairs[{k}]");
-            self.either(&path, ("fracture_energy", fracture_energy.is_some()), ("stretch", stretch.is_some()));
+            self.either(
+                &path,
+                ("fracture_energy", fracture_energy.is_some()),
+                ("stretch", stretch.is_some()),
+                "stretch = 0.01",
+            );
             for (i, name) in between.iter().enumerate() {
                 self.set_name(name, case, imported, &format!("{path}.between[{i}]"), used);
             }
@@ -331,7 +361,7 @@ impl Checker<'_> {
         }
         let names: Vec<&str> = case.sets.keys().map(String::as_str).chain(["all"]).collect();
         let help = nearest(name, names.iter().copied()).map_or(String::new(), |n| format!("did you mean `{n}`?"));
-        self.error(path, format!("found \"{name}\"; no set has this name; sets: {}", names.join(", ")), &help);
+        self.error(path, format!("no set has this name; sets: {}", names.join(", ")), &help);
     }
 
     fn outputs(&mut self, case: &Case) {
@@ -344,6 +374,7 @@ impl Checker<'_> {
                     &format!("{path}.vtu"),
                     ("every", vtu.every.is_some()),
                     ("every_steps", vtu.every_steps.is_some()),
+                    "every_steps = 100",
                 ),
                 Output::Picture(picture) => {
                     let path = format!("{path}.picture");

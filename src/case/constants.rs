@@ -67,6 +67,13 @@ impl Constants {
         if parsed.is_err() && (variables.contains(&word) || self.known.iter().any(is_known)) {
             return None;
         }
+        let is_right = |unit: &Unit| wanted.is_none_or(|wanted| wanted == unit.dimension);
+        let mut others = names(unit_text).skip(1);
+        if !parsed.as_ref().is_ok_and(is_right)
+            && others.any(|name| variables.contains(&name) || self.known.iter().any(|(known, _)| known == name))
+        {
+            return Some(Err(unit_in_formula(0, text.len())));
+        }
         let value = parsed.map_err(Mistake::Unit).and_then(|unit| {
             if wanted.is_some_and(|wanted| wanted != unit.dimension) {
                 return Err(Mistake::Dimension { found: unit.dimension });
@@ -80,7 +87,17 @@ impl Constants {
     /// Compiles a formula of the given variables.
     pub fn compile(&self, text: &str, variables: &[&str]) -> Result<Expression, Mistake> {
         Expression::compile(text, variables, &self.known).map_err(|error| {
-            if names(text).any(|name| self.failed.contains(name)) { Mistake::Echo } else { Mistake::Expression(error) }
+            let part = split_quantity(text.get(error.start..error.end).unwrap_or(""));
+            if names(text).any(|name| self.failed.contains(name)) {
+                Mistake::Echo
+            } else if part.is_some_and(|(_, unit)| {
+                let is_name = variables.contains(&unit) || self.known.iter().any(|(known, _)| known == unit);
+                !is_name && Unit::parse(unit).is_ok()
+            }) {
+                unit_in_formula(error.start, error.end)
+            } else {
+                Mistake::Expression(error)
+            }
         })
     }
 
@@ -233,6 +250,12 @@ impl<'a> Evaluation<'a> {
         let diagnostic = Diagnostic::error(place, &path, message);
         self.diagnostics.push(more(diagnostic));
     }
+}
+
+fn unit_in_formula(start: usize, end: usize) -> Mistake {
+    let message = "a number with a unit cannot be a part of a formula".to_owned();
+    let help = "write it in SI units without a unit, or name it in [constants]".to_owned();
+    Mistake::Expression(ExpressionError { message, start, end, help: Some(help) })
 }
 
 impl Mistake {

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 /// A case: one body, its physics, what acts on it, how time advances, what is written.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-smallest" = include_str!("smallest.toml")))]
 pub struct Case {
     pub case: Header,
     pub geometry: Geometry,
@@ -499,6 +500,7 @@ pub enum Solver {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VelocityVerlet {
+    /// The instant at which the run ends.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
     pub end_time: f64,
     /// Δt as a fraction of the stable step that is estimated from the discretisation (0.8 if not given). Either this or

@@ -59,7 +59,8 @@ pub struct Source {
 #[derive(Debug, Clone)]
 struct Spot {
     origin: Origin,
-    found: String,
+    /// The value as it was written; `None` for a table or a long list, whose kind alone tells nothing.
+    found: Option<String>,
 }
 
 /// Reads a case from a file. The overrides are pairs of key path and value, as in
@@ -74,7 +75,10 @@ pub fn read_file<T: DeserializeOwned + JsonSchema>(
         Diagnostics { file: name.clone(), list }
     };
     let whole = || Place::File { file: name.clone() };
-    let cannot = |e: std::io::Error| refuse(whole(), format!("cannot be read: {e}"));
+    let cannot = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::NotFound => refuse(whole(), "there is no such file".to_owned()),
+        _ => refuse(whole(), format!("cannot be read: {e}")),
+    };
     // Asked before the file is opened: opening a pipe waits for its other end.
     let metadata = fs::metadata(path).map_err(cannot)?;
     if !metadata.is_file() {
@@ -85,8 +89,7 @@ pub fn read_file<T: DeserializeOwned + JsonSchema>(
     // The length can be wrong or grow; the reader is held to the limit as well.
     file.take(LARGEST + 1).read_to_end(&mut bytes).map_err(cannot)?;
     if bytes.len() as u64 > LARGEST {
-        let message = format!("is larger than {} MiB", LARGEST >> 20);
-        return Err(refuse(whole(), message));
+        return Err(refuse(whole(), too_large()));
     }
     match String::from_utf8(bytes) {
         Ok(text) => read_text(&name, &text, overrides),
@@ -102,6 +105,10 @@ pub fn read_file<T: DeserializeOwned + JsonSchema>(
     }
 }
 
+fn too_large() -> String {
+    format!("is larger than {} MiB; a table of points belongs into a CSV file", LARGEST >> 20)
+}
+
 /// Reads a case from a text; `name` stands for the file in messages.
 pub fn read_text<T: DeserializeOwned + JsonSchema>(
     name: &str,
@@ -110,9 +117,8 @@ pub fn read_text<T: DeserializeOwned + JsonSchema>(
 ) -> Result<Located<T>, Diagnostics> {
     let mut source = Source::new(name, text, overrides);
     if text.len() as u64 > LARGEST {
-        let message = format!("is larger than {} MiB", LARGEST >> 20);
         let place = Place::File { file: name.to_owned() };
-        return Err(source.refuse(vec![Diagnostic::error(place, "", message)]));
+        return Err(source.refuse(vec![Diagnostic::error(place, "", too_large())]));
     }
     let (mut root, mut mistakes, readable) = tree::parse(&source);
     if !readable {
@@ -244,9 +250,9 @@ impl Source {
         }
     }
 
-    /// The value at a key path as it was written; `None` if it is not written in the case.
+    /// The value at a key path as it was written; `None` if it is not written there or is a table.
     pub fn written(&self, path: &str) -> Option<&str> {
-        self.spots.get(path).map(|spot| spot.found.as_str())
+        self.spots.get(path)?.found.as_deref()
     }
 
     /// An error about the value at a key path, with its place and what was found there.
@@ -309,7 +315,8 @@ impl Source {
 
     /// Remembers where a key path is written.
     pub(super) fn record(&mut self, path: &str, node: &Node) {
-        let spot = Spot { origin: node.origin.clone(), found: self.found(node) };
+        let found = Some(self.found(node)).filter(|found| found != node.kind());
+        let spot = Spot { origin: node.origin.clone(), found };
         self.spots.insert(path.to_owned(), spot);
     }
 }

@@ -42,18 +42,19 @@ impl<'a> Context<'a> {
         self.unit.map_or_else(Dimension::default, Dimension::of)
     }
 
-    /// `a pressure in Pa, kPa, MPa above 0`.
+    /// `a pressure in Pa, kPa, MPa, above 0`.
     pub fn allowed(&self, layers: &Layers<'_>) -> String {
-        let dimension = self.dimension();
         let range = layers.range().map_or_else(String::new, |r| format!(", {r}"));
+        format!("{}{range}", self.quantity())
+    }
+
+    /// `a pressure in Pa, kPa, MPa`.
+    pub fn quantity(&self) -> String {
+        let dimension = self.dimension();
         let name = dimension.name();
-        let units = dimension.units();
-        if dimension.is_one() {
-            return format!("{name}{range}");
-        }
         match name.split_once(" in ") {
-            Some(_) => format!("{name}{range}"),
-            None => format!("{name} in {units}{range}"),
+            None if !dimension.is_one() => format!("{name} in {}", dimension.units()),
+            _ => name,
         }
     }
 }
@@ -250,6 +251,9 @@ impl<'a> Layers<'a> {
             let most = self.get("maxItems").and_then(Value::as_u64);
             return match (least, most) {
                 (Some(least), Some(most)) if least == most => format!("a list of {least}"),
+                _ if self.get("items").is_some_and(|items| Self::of(self.root, items).kinds().contains(&"object")) => {
+                    "a list of tables, each under a heading in double brackets, `[[...]]`".to_owned()
+                }
                 _ => "a list, e.g. [1, 2]".to_owned(),
             };
         }
@@ -261,8 +265,11 @@ impl<'a> Layers<'a> {
     }
 
     /// The line to add for a missing key, with the first sentence of its description.
-    pub fn line(&self, name: &str, context: &Context<'a>) -> String {
-        let line = format!("add `{name} = {}`", self.placeholder(context));
+    pub fn line(&self, name: &str, path: &str, context: &Context<'a>) -> String {
+        let line = match self.variants() {
+            None if self.kinds() == ["object"] => format!("add a table `[{path}]`"),
+            _ => format!("add `{name} = {}`", self.placeholder(context)),
+        };
         let description = self.get("description").and_then(Value::as_str);
         match description.and_then(|text| text.split(['\n', '.']).next()) {
             Some(sentence) if !sentence.is_empty() => format!("{line}: {sentence}"),
@@ -275,7 +282,10 @@ impl<'a> Layers<'a> {
         let context = &context.within(self);
         if let Some(variants) = self.variants() {
             let names: Vec<_> = variants.iter().map(Variant::shown).collect();
-            return format!("<{}>", names.join(" or "));
+            return match names.as_slice() {
+                [one] => one.clone(),
+                _ => format!("<{}>", names.join(" or ")),
+            };
         }
         if let Some(union) = self.alternatives() {
             let all = union.iter().map(|s| Self::of(self.root, s).placeholder(context));

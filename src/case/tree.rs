@@ -150,6 +150,19 @@ fn syntax_diagnostic(source: &Source, error: &TomlError, start: usize) -> Diagno
         if no_value && message.contains("must be quoted") {
             return Diagnostic::error(place, "", "a value is missing");
         }
+        if message.contains("must be quoted") {
+            let value = line_after.split(['#', ',', '}', ']']).next().unwrap_or("").trim_end();
+            let diagnostic = Diagnostic::error(place, "", "a text, or a number with a unit, stands in quotes");
+            let plain = !value.contains(['"', '\'', '\\']);
+            return if plain { diagnostic.help(format!("write `\"{}\"`", shorten(value))) } else { diagnostic };
+        }
+        if message.starts_with("invalid basic string") {
+            return Diagnostic::error(
+                place,
+                "",
+                "this is not TOML: a text is not closed, or `\\` is not doubled in it",
+            );
+        }
         let text = format!("this is not TOML: {message}");
         if message.contains("between array") {
             let help = "is a list above this line not closed with `]`?";

@@ -182,8 +182,9 @@ impl<'a> Validator<'a> {
             let place = self.source.place_of(&node.origin);
             let message = format!("missing key `{name}`");
             let schema = properties.and_then(|map| map.get(name));
-            let line = schema.map_or_else(String::new, |schema| Layers::of(self.schema, schema).line(name, context));
             let path = join(path, name);
+            let line = schema.map(|schema| Layers::of(self.schema, schema).line(name, &path, context));
+            let line = line.unwrap_or_default();
             self.mistakes.push(Diagnostic::error(place, &path, message).help(line));
         }
         sound.then_some(Value::Object(result))
@@ -371,7 +372,7 @@ impl<'a> Validator<'a> {
         let limit = |key: &str| layers.get(key).and_then(Value::as_f64);
         let range = layers.range();
         let allowed = |context: &Context<'a>| match context.unit {
-            Some(_) if !context.dimension().is_one() => Some(context.allowed(layers)),
+            Some(_) if !context.dimension().is_one() => Some(context.quantity()),
             _ => None,
         };
         if !number.is_finite() {

@@ -7,9 +7,13 @@ mod constants;
 mod crack_branching;
 pub mod discrete;
 mod discrete_moduli;
+mod dispersion;
+mod energy_drift;
+pub mod exact;
 mod family_counts;
 mod fracture_work;
 mod navier;
+mod wave;
 
 use serde::Serialize;
 
@@ -57,6 +61,9 @@ pub const STUDIES: &[Study] = &[
         heavy: false,
         run: discrete_moduli::run,
     },
+    wave::WAVE_IN_BAR,
+    dispersion::DISPERSION,
+    energy_drift::ENERGY_DRIFT,
     Study {
         name: "crack-branching",
         about: "a crack that branches in glass: broken bonds, tip, branching point, symmetry, energies",

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::case::diagnostics::shorten;
 use crate::error::{Error, Result};
 use crate::field::Vector;
 
@@ -29,6 +30,7 @@ pub fn read<const D: usize>(path: &Path) -> Result<Points<D>> {
     }
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
+        .flexible(true)
         .trim(csv::Trim::All)
         .from_path(path)
         .map_err(|e| Error::Refused(format!("{}: {e}", path.display())))?;
@@ -37,14 +39,20 @@ pub fn read<const D: usize>(path: &Path) -> Result<Points<D>> {
     let known: Vec<&str> = names.iter().copied().chain(["volume", "sets"]).collect();
     for header in &headers {
         if !known.contains(&header) {
-            let separator = if header.contains(';') { "; columns are separated by commas" } else { "" };
-            return Err(refuse(1, format!("column `{header}`; known columns: {}{separator}", known.join(", "))));
+            let hint = match header {
+                _ if header.contains(';') => "; columns are separated by commas",
+                _ if header.parse::<f64>().is_ok() => "; the first line must name the columns",
+                _ => "",
+            };
+            let (header, known) = (shorten(header), known.join(", "));
+            return Err(refuse(1, format!("unknown column `{header}`; known columns: {known}{hint}")));
         }
     }
     let column = |name: &str| {
         let found: Vec<usize> = (0..headers.len()).filter(|&k| &headers[k] == name).collect();
         match found[..] {
             [k] => Ok(k),
+            [] if headers.is_empty() => Err(refuse(1, "the table is empty".into())),
             [] => Err(refuse(
                 1,
                 format!("column `{name}` is missing; found: {}", headers.iter().collect::<Vec<_>>().join(", ")),
@@ -62,17 +70,30 @@ pub fn read<const D: usize>(path: &Path) -> Result<Points<D>> {
     for record in reader.records() {
         let record = record.map_err(|e| {
             let line = e.position().map_or(0, csv::Position::line);
-            refuse(line, e.to_string())
+            match e.kind() {
+                csv::ErrorKind::Utf8 { .. } => refuse(line, "this line is not UTF-8".into()),
+                csv::ErrorKind::Io(e) => Error::Refused(format!("{}: {e}", path.display())),
+                _ => refuse(line, e.to_string()),
+            }
         })?;
         let line = record.position().map_or(0, csv::Position::line);
+        if record.len() != headers.len() {
+            let quote = if record.iter().any(|cell| cell.contains('\n')) { "; is a quote not closed?" } else { "" };
+            let (columns, cells) = (headers.len(), record.len());
+            let message = format!("the header names {columns} columns, this line has {cells}{quote}");
+            return Err(refuse(line, message));
+        }
         let number = |k: usize| {
             let cell = &record[k];
             match cell.parse::<f64>() {
                 Ok(x) if x.is_finite() => Ok(x),
-                _ => Err(refuse(
-                    line,
-                    format!("column `{}`: found `{cell}`, where a finite number is wanted", &headers[k]),
-                )),
+                _ => {
+                    let is_comma = cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok();
+                    let hint = if is_comma { "; decimals are written with a point" } else { "" };
+                    let (column, cell) = (&headers[k], shorten(cell));
+                    let message = format!("column `{column}`: found `{cell}`, where a finite number is wanted{hint}");
+                    Err(refuse(line, message))
+                }
             }
         };
         let mut position = [0.0; D];
@@ -95,7 +116,23 @@ pub fn read<const D: usize>(path: &Path) -> Result<Points<D>> {
     if points.positions.is_empty() {
         return Err(refuse(1, "the table holds no points".into()));
     }
+    if let Some((a, b)) = twins(&points.positions) {
+        let position = points.positions[a].map(|x| x.to_string()).join(", ");
+        return Err(Error::Refused(format!(
+            "{}: error: points {a} and {b}, counted from 0, are in one place, ({position}) m",
+            path.display()
+        )));
+    }
     Ok(points)
+}
+
+/// The first two points that are in one place: their bond would have no length.
+fn twins<const D: usize>(positions: &[Vector<D>]) -> Option<(usize, usize)> {
+    let mut order: Vec<usize> = (0..positions.len()).collect();
+    // Adding 0 makes one zero of the two.
+    let key = |&i: &usize| positions[i].map(|x| (x + 0.0).to_bits());
+    order.sort_unstable_by_key(|i| (key(i), *i));
+    order.windows(2).find(|pair| key(&pair[0]) == key(&pair[1])).map(|pair| (pair[0], pair[1]))
 }
 
 #[cfg(test)]
