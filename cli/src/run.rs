@@ -13,6 +13,9 @@ use bondwise::simulation::{Wish, prepare_folder};
 use crate::progress::Line;
 use crate::{RunArgs, on_threads, say};
 
+/// Imbalance above which a run is not to be trusted: crack growth at the stable step stays well below.
+const IMBALANCE: f64 = 0.01;
+
 pub fn run(args: &RunArgs) -> Result<ExitCode> {
     let folder = args.out.clone().unwrap_or_else(|| free_folder(&args.case.case));
     let report = on_threads(args.case.threads, || -> Result<Report> {
@@ -52,6 +55,13 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
     })??;
     if !args.quiet {
         summary(&report, &folder);
+    }
+    if report.energy_imbalance > IMBALANCE {
+        eprintln!(
+            "warning: the energy balance is off by {:.1} % of what came in\n    help: a smaller step, or loads and \
+             initial values that start more gently; see the column `imbalance` of history.csv",
+            100.0 * report.energy_imbalance
+        );
     }
     Ok(if report.status == "interrupted" { ExitCode::from(130) } else { ExitCode::SUCCESS })
 }
