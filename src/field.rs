@@ -26,7 +26,11 @@ pub fn norm<const D: usize>(a: &Vector<D>) -> f64 {
 /// a − b
 #[inline]
 pub fn difference<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> Vector<D> {
-    std::array::from_fn(|d| a[d] - b[d])
+    let mut c = *a;
+    for d in 0..D {
+        c[d] -= b[d];
+    }
+    c
 }
 
 /// The components of a flat field of `N` components.

@@ -10,6 +10,7 @@ use super::{Influence, PartialVolume};
 use crate::family::{Body, Families};
 use crate::field::{Vector, difference};
 use crate::geometry::Arrangement;
+use crate::lane::LANES;
 
 /// The weights of one law on one body.
 #[derive(Debug, Clone)]
@@ -113,6 +114,19 @@ impl Operator {
 }
 
 impl CloudWeights {
+    /// Replaces the volumes at the other ends of consecutive bonds by the weights of the bonds.
+    #[inline]
+    pub fn weigh(&self, first: usize, lengths: &[f64; LANES], volumes: &mut [f64; LANES]) {
+        match (&self.influence, &self.fractions) {
+            (Influence::Constant, Fractions::Full) => volumes.iter_mut().for_each(|v| *v *= self.strength),
+            _ => {
+                for k in 0..LANES {
+                    volumes[k] = self.weight(first + k, lengths[k], volumes[k]);
+                }
+            }
+        }
+    }
+
     /// The weight of bond number `bond`, of length |ξ| (m), to a point of volume V′.
     #[inline]
     pub fn weight(&self, bond: usize, length: f64, volume: f64) -> f64 {

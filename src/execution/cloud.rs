@@ -8,7 +8,6 @@ use std::ops::Range;
 use super::{BreakRule, Broken, SharedSlice, StatesPointer};
 use crate::discretization::standard::CloudWeights;
 use crate::family::{Body, Bond, BondKernel, CloudFamilies};
-use crate::field::{Vector, difference, norm};
 use crate::geometry::Arrangement;
 use crate::lane::{LANES, Lane, Pack};
 
@@ -34,7 +33,11 @@ pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, 
     };
     let mut broken = Broken::default();
     for point in points {
-        let here: [f64; I] = input.map(|f| f[point]);
+        let x = &positions[point];
+        let mut here = [Pack::splat(0.0); I];
+        for c in 0..I {
+            here[c] = Pack::splat(input[c][point]);
+        }
         let mut sum = [Pack::splat(0.0); O];
         for group in families.starts[point] as usize..families.starts[point + 1] as usize {
             // SAFETY: one byte a group; the groups of a point belong to the chunk that owns the point.
@@ -42,32 +45,39 @@ pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, 
             if *byte == 0 {
                 continue;
             }
-            let neighbours: &[u32; LANES] =
-                families.neighbours[group * LANES..][..LANES].try_into().expect("families are padded to LANES");
-            let bonds: [Bond<D, f64>; LANES] = std::array::from_fn(|k| {
+            let neighbours = &families.neighbours[group * LANES..(group + 1) * LANES];
+            let mut bond = Bond { xi: [Pack::splat(0.0); D], length: Pack::splat(0.0), weight: Pack::splat(0.0) };
+            let mut there = here;
+            for k in 0..LANES {
                 let other = neighbours[k] as usize;
-                let xi: Vector<D> = difference(&positions[other], &positions[point]);
-                let length = norm(&xi);
+                let mut square = 0.0;
+                for d in 0..D {
+                    let xi = positions[other][d] - x[d];
+                    bond.xi[d].0[k] = xi;
+                    square += xi * xi;
+                }
                 // Padding is the point itself: any length but zero will do, its bit is never set.
-                let length = if length > 0.0 { length } else { 1.0 };
-                Bond { xi, length, weight: weights.weight(group * LANES + k, length, volumes[other]) }
-            });
-            let there: [[f64; LANES]; I] =
-                std::array::from_fn(|c| std::array::from_fn(|k| input[c][neighbours[k] as usize]));
-            let bond = Bond {
-                xi: std::array::from_fn(|d| Pack(std::array::from_fn(|k| bonds[k].xi[d]))),
-                length: Pack(std::array::from_fn(|k| bonds[k].length)),
-                weight: Pack(std::array::from_fn(|k| bonds[k].weight)),
-            };
-            let (value, stretch) = kernel.evaluate(&bond, here.map(Pack::splat), there.map(Pack));
+                bond.length.0[k] = if square > 0.0 { square.sqrt() } else { 1.0 };
+                bond.weight.0[k] = volumes[other];
+                for c in 0..I {
+                    there[c].0[k] = input[c][other];
+                }
+            }
+            weights.weigh(group * LANES, &bond.length.0, &mut bond.weight.0);
+            let (value, stretch) = kernel.evaluate(&bond, here, there);
             if stretch.keep(*byte).largest() > rule.threshold() {
-                for (k, bond) in bonds.iter().enumerate() {
-                    let s = stretch.0[k];
+                for k in 0..LANES {
+                    let (s, other) = (stretch.0[k], neighbours[k] as usize);
                     let holds = *byte >> k & 1 == 1;
-                    if holds && s > rule.threshold() && rule.breaks(point, neighbours[k] as usize, s) {
+                    if holds && s > rule.threshold() && rule.breaks(point, other, s) {
+                        let mut xi = [0.0; D];
+                        for d in 0..D {
+                            xi[d] = bond.xi[d].0[k];
+                        }
+                        let bond = Bond { xi, length: bond.length.0[k], weight: bond.weight.0[k] };
                         *byte &= !(1 << k);
                         broken.bonds += 1;
-                        broken.energy += volumes[point] * rule.released(bond, point, neighbours[k] as usize);
+                        broken.energy += volumes[point] * rule.released(&bond, point, other);
                     }
                 }
             }
