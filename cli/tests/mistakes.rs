@@ -151,6 +151,8 @@ fn mistakes() -> Vec<Mistake> {
         patch("constant_with_a_taken_name", "h = \"1 mm\"", "h = \"1 mm\"\nt = 3"),
         // Files.
         Mistake::whole("ten_mistakes", TEN),
+        // A rule across keys is asked beside a mistake of one key, about what the mistake does not touch.
+        Mistake::patch("rules_beside_a_mistake", &[(YOUNG, "young = \"72 GPA\""), ("on = \"top\"", "on = \"tpo\"")]),
         Mistake::whole("not_utf8", b"# A strip.\n[case]\ntitle = \"Stri\xFFp\"\n".to_vec()),
         Mistake::whole("empty", ""),
         Mistake::whole("only_comments", "# A strip.\n\n# To be done.\n"),

@@ -749,7 +749,7 @@ pub fn available_memory() -> Option<u64> {
 /// Reads and builds a case file, or the `case.toml` of a folder.
 pub fn load(path: &Path, overrides: &[(String, String)], options: &Options) -> Result<Simulation> {
     let file = if path.is_dir() { path.join("case.toml") } else { path.to_path_buf() };
-    let mut case = super::read_file::<Case>(&file, overrides);
+    let mut case = super::read_file::<Case>(&file, overrides, check);
     if let (Err(mistakes), Some(name)) = (&mut case, path.to_str())
         && !path.exists()
         && bundled::CASES.iter().any(|case| case.name == name)

@@ -64,10 +64,11 @@ struct Spot {
 }
 
 /// Reads a case from a file. The overrides are pairs of key path and value, as in
-/// `--set conditions.0.value=2`.
+/// `--set conditions.0.value=2`; for the rules see [`read_text_with`].
 pub fn read_file<T: DeserializeOwned + JsonSchema>(
     path: &Path,
     overrides: &[(String, String)],
+    rules: impl Fn(&Located<T>) -> Vec<Diagnostic>,
 ) -> Result<Located<T>, Diagnostics> {
     let name = path.display().to_string();
     let refuse = |place: Place, message: String| {
@@ -92,7 +93,7 @@ pub fn read_file<T: DeserializeOwned + JsonSchema>(
         return Err(refuse(whole(), too_large()));
     }
     match String::from_utf8(bytes) {
-        Ok(text) => read_text(&name, &text, overrides),
+        Ok(text) => read_text_with(&name, &text, overrides, rules),
         Err(error) => {
             let offset = error.utf8_error().valid_up_to();
             let before = String::from_utf8_lossy(&error.as_bytes()[..offset]).into_owned();
@@ -114,6 +115,31 @@ pub fn read_text<T: DeserializeOwned + JsonSchema>(
     name: &str,
     text: &str,
     overrides: &[(String, String)],
+) -> Result<Located<T>, Diagnostics> {
+    read_text_with(name, text, overrides, |_| Vec::new())
+}
+
+/// Whether a remark of a rule across keys can be trusted, although the case has mistakes: it is about another table than
+/// any of them, and none of them is about the case as a whole.
+fn stands_alone(remark: &Diagnostic, mistakes: &[Diagnostic]) -> bool {
+    let within = |path: &str, table: &str| {
+        path.strip_prefix(table).is_some_and(|rest| table.is_empty() || rest.is_empty() || rest.starts_with(['.', '[']))
+    };
+    remark.severity == Severity::Error
+        && mistakes.iter().all(|mistake| {
+            let table = mistake.path.rfind(['.', '[']).map_or("", |end| &mistake.path[..end]);
+            // What the first table says, such as the dimension, and constants are asked for everywhere.
+            let everywhere = within(&mistake.path, "case") || within(&mistake.path, "constants");
+            !everywhere && !within(&remark.path, table) && !within(&mistake.path, &remark.path)
+        })
+}
+
+/// As [`read_text`]; if the text has mistakes, the rules across keys are asked too, about what is not touched by them.
+pub fn read_text_with<T: DeserializeOwned + JsonSchema>(
+    name: &str,
+    text: &str,
+    overrides: &[(String, String)],
+    rules: impl Fn(&Located<T>) -> Vec<Diagnostic>,
 ) -> Result<Located<T>, Diagnostics> {
     let mut source = Source::new(name, text, overrides);
     if text.len() as u64 > LARGEST {
@@ -137,6 +163,12 @@ pub fn read_text<T: DeserializeOwned + JsonSchema>(
     let (value, found) = validate::validate(&root, &schema, &constants, &mut source);
     mistakes.extend(found);
     if !mistakes.is_empty() {
+        if let Ok(value) = serde_json::from_value(value) {
+            let case = Located { value, source: source.clone(), constants: constants.known };
+            let further = rules(&case).into_iter().filter(|remark| stands_alone(remark, &mistakes));
+            let further: Vec<_> = further.collect();
+            mistakes.extend(further);
+        }
         return Err(source.refuse(mistakes));
     }
     match serde_json::from_value(value) {

@@ -469,13 +469,13 @@ fn only_regular_files_of_utf8_are_read() {
     std::fs::create_dir_all(&folder).unwrap();
     let file = folder.join("bad.toml");
     std::fs::write(&file, b"title = 1\nname = \"\xFF\"\n").unwrap();
-    let error = |path: &std::path::Path| read_file::<Case>(path, &[]).unwrap_err().to_string();
+    let error = |path: &std::path::Path| read_file::<Case>(path, &[], |_| Vec::new()).unwrap_err().to_string();
     let text = error(&file);
     assert!(text.contains(":2:9: error: byte 0xFF at offset 18 is not UTF-8"), "{text}");
     assert!(error(&folder).contains("is not a regular file"));
     assert!(error(&folder.join("none")).contains("there is no such file"));
     std::fs::write(&file, GOOD).unwrap();
-    assert!(read_file::<Case>(&file, &[]).is_ok());
+    assert!(read_file::<Case>(&file, &[], |_| Vec::new()).is_ok());
     std::fs::remove_dir_all(&folder).unwrap();
 }
 

@@ -15,10 +15,13 @@ use super::tree::{Entry, Node, NodeValue, Origin, join};
 
 /// A file that is wrong all over is not worth more lines than this.
 const MOST_MISTAKES: usize = 100;
+/// How deep a value that takes the place of a wrong one may be nested: types may contain themselves.
+const DEEPEST_STAND_IN: usize = 8;
 /// Entries of one list whose places are remembered; a later one is found at its list.
 const MOST_LOCATED: usize = 1000;
 
-/// The JSON of the tree and all mistakes in it. The JSON means nothing if there is a mistake.
+/// The JSON of the tree and all mistakes in it. Where there is a mistake, the JSON holds some value of the right kind in
+/// its place, so that rules across keys can still look at the rest; it is null where that cannot be had.
 pub(super) fn validate(
     root: &Node,
     schema: &Value,
@@ -53,6 +56,51 @@ impl<'a> Validator<'a> {
     fn check_unrecorded(&mut self, node: &Node, schema: &'a Value, context: &Context<'a>, path: &str) -> Option<Value> {
         let layers = Layers::of(self.schema, schema);
         self.check_layers(node, &layers, context, path)
+    }
+
+    /// A value of the right kind, whatever it says: it takes the place of one that is wrong.
+    fn stand_in_for(&self, schema: &'a Value) -> Option<Value> {
+        self.stand_in(&Layers::of(self.schema, schema), 0)
+    }
+
+    fn stand_in(&self, layers: &Layers<'a>, depth: usize) -> Option<Value> {
+        if depth > DEEPEST_STAND_IN {
+            return None;
+        }
+        if let Some(variants) = layers.variants() {
+            return variants.iter().find_map(|variant| match variant.data {
+                None => Some(Value::from(variant.name)),
+                Some(data) => {
+                    let value = self.stand_in(&Layers::of(self.schema, data), depth + 1)?;
+                    Some(Value::Object(Map::from_iter([(variant.name.to_owned(), value)])))
+                }
+            });
+        }
+        if let Some(union) = layers.alternatives() {
+            return union.iter().find_map(|s| self.stand_in(&layers.clone().then(s), depth + 1));
+        }
+        let kinds = layers.kinds();
+        let kind = if kinds.contains(&"null") { "null" } else { *kinds.first()? };
+        match kind {
+            "null" => Some(Value::Null),
+            "number" => Some(Value::from(1.0)),
+            "integer" => Some(Value::from(1)),
+            "string" => Some(Value::from("")),
+            "boolean" => Some(Value::from(false)),
+            "array" => Some(Value::Array(Vec::new())),
+            "object" => {
+                let properties = layers.get("properties").and_then(Value::as_object);
+                let required = layers.get("required").and_then(Value::as_array);
+                let mut result = Map::new();
+                for name in required.into_iter().flatten().filter_map(Value::as_str) {
+                    let schema = properties?.get(name)?;
+                    let value = self.stand_in(&Layers::of(self.schema, schema), depth + 1)?;
+                    result.insert(name.to_owned(), value);
+                }
+                Some(Value::Object(result))
+            }
+            _ => None,
+        }
     }
 
     fn check_layers(&mut self, node: &Node, layers: &Layers<'a>, context: &Context<'a>, path: &str) -> Option<Value> {
@@ -138,6 +186,8 @@ impl<'a> Validator<'a> {
         let is_map = others.is_some() || properties.is_none_or(Map::is_empty);
         let is_map = is_map && layers.get("additionalProperties") != Some(&Value::Bool(false));
         let known = || properties.into_iter().flat_map(Map::keys);
+        let required = layers.get("required").and_then(Value::as_array);
+        let is_required = |key: &str| required.is_some_and(|names| names.iter().any(|name| name == key));
         let mut result = Map::new();
         let mut sound = true;
         // A required key that was misspelt is one mistake, not two.
@@ -163,25 +213,35 @@ impl<'a> Validator<'a> {
                         _ => known().cloned().collect::<Vec<_>>().join(", "),
                     });
                     meant.extend(near);
-                    self.report(diagnostic)
+                    self.mistakes.push(diagnostic);
+                    continue;
                 }
             };
-            match value {
+            // What may be missing is left out; what must be there, or has a name of the user's, gets a stand-in.
+            let needed = properties.and_then(|map| map.get(&entry.key)).is_none() || is_required(&entry.key);
+            match value.or_else(|| child.filter(|_| needed).and_then(|s| self.stand_in_for(s))) {
                 Some(value) => {
                     result.insert(entry.key.clone(), value);
                 }
-                None => sound = false,
+                None => sound &= !needed,
             }
         }
-        let required = layers.get("required").and_then(Value::as_array);
         for name in required.into_iter().flatten().filter_map(Value::as_str) {
-            if meant.contains(&name) || entries.iter().any(|entry| entry.key == name) {
+            if entries.iter().any(|entry| entry.key == name) {
                 continue;
             }
-            sound = false;
+            let schema = properties.and_then(|map| map.get(name));
+            match schema.and_then(|schema| self.stand_in_for(schema)) {
+                Some(value) => {
+                    result.insert(name.to_owned(), value);
+                }
+                None => sound = false,
+            }
+            if meant.contains(&name) {
+                continue;
+            }
             let place = self.source.place_of(&node.origin);
             let message = format!("missing key `{name}`");
-            let schema = properties.and_then(|map| map.get(name));
             let path = join(path, name);
             let line = schema.map(|schema| Layers::of(self.schema, schema).line(name, &path, context));
             let line = line.unwrap_or_default();
@@ -225,7 +285,7 @@ impl<'a> Validator<'a> {
                 Some(schema) => self.check_unrecorded(item, schema, context, &item_path),
                 None => Some(raw(item)),
             };
-            match value {
+            match value.or_else(|| schema.and_then(|schema| self.stand_in_for(schema))) {
                 Some(value) => result.push(value),
                 None => sound = false,
             }
@@ -273,6 +333,7 @@ impl<'a> Validator<'a> {
                         Some(Variant { name, data: Some(data) }) => {
                             known += 1;
                             let value = self.check(&entry.node, data, context, &child_path);
+                            let value = value.or_else(|| self.stand_in_for(data));
                             result = value.map(|value| Value::Object(Map::from_iter([((*name).to_owned(), value)])));
                         }
                         Some(Variant { name, data: None }) => {
