@@ -115,7 +115,7 @@ impl log::Log for Warnings {
 }
 
 fn main() -> ExitCode {
-    // A pipe that is closed early, as by `head`, must not end a run with a panic.
+    // Fails only if a logger is set already.
     let _ = log::set_logger(&Warnings).map(|()| log::set_max_level(log::LevelFilter::Warn));
     let cli = Cli::parse();
     let result = match cli.command {
