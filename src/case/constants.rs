@@ -15,17 +15,11 @@ use super::diagnostics::{Diagnostic, shorten};
 use super::read::Source;
 use super::tree::{Entry, Node, NodeValue, Origin, join};
 use super::units::{Dimension, Unit, UnitError, split_quantity};
-use crate::expression::{Expression, ExpressionError, nearest};
+use crate::conditions::profile::VARIABLES;
+use crate::expression::{Expression, ExpressionError, is_reserved, nearest};
 
 /// More than any case needs; bounds the depth of a chain of constants.
 const MOST_CONSTANTS: usize = 1000;
-
-/// Names that mean something in every expression.
-const RESERVED: [&str; 34] = [
-    "x", "y", "z", "t", "pi", "and", "or", "not", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh",
-    "tanh", "exp", "log", "log10", "sqrt", "abs", "sign", "floor", "ceil", "min", "max", "pow", "hypot", "step", "if",
-    "clamp", "erf",
-];
 
 /// The constants of a case that could be computed, and the names of those that could not.
 #[derive(Debug, Default)]
@@ -210,7 +204,7 @@ impl<'a> Evaluation<'a> {
             self.report(&entry.key_origin, name, message.to_owned(), |d| d);
             return None;
         }
-        if RESERVED.contains(&name) {
+        if VARIABLES.contains(&name) || is_reserved(name) {
             let message = format!("`{name}` means something else in every expression");
             self.report(&entry.key_origin, name, message, |d| d.help("choose another name"));
             return None;

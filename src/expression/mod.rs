@@ -242,6 +242,11 @@ impl Expression {
     }
 }
 
+/// Whether a name means something in every formula: a function, `pi`, or a word of logic.
+pub fn is_reserved(name: &str) -> bool {
+    ["pi", "and", "or", "not"].contains(&name) || FUNCTIONS.iter().any(|function| function.name == name)
+}
+
 /// The candidate nearest to a name that is probably misspelled, `None` if all are too far.
 ///
 /// The distance counts letters inserted, dropped, replaced, and neighbours swapped; upper and lower
