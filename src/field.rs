@@ -4,6 +4,69 @@
 //! that solvers see plain numbers and the bond loops see structure-of-arrays. Deliberately absent: any owner of
 //! fields by name. Names exist for output only.
 
+use std::fmt::Debug;
+
+/// A number that a field is stored in, or that the arithmetic along a bond is done in: `f64` or `f32`.
+pub trait Number: Copy + Default + PartialOrd + Debug + Send + Sync + 'static {
+    fn from_f64(x: f64) -> Self;
+    fn to_f64(self) -> f64;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn from_f64(x: f64) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        self
+    }
+}
+
+impl Number for f32 {
+    #[inline(always)]
+    fn from_f64(x: f64) -> Self {
+        x as f32
+    }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+/// What a run stores its fields in, and what it computes bonds in.
+pub trait Precision: Copy + Debug + Default + Send + Sync + 'static {
+    type Field: Number;
+    type Bond: Number;
+    const NAME: &str;
+}
+
+/// Fields and bonds in `f64`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Double;
+/// Fields and bonds in `f32`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Single;
+/// Fields in `f64`; the displacements of the ends of a bond are subtracted in `f64`, the rest of a bond is `f32`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Mixed;
+
+impl Precision for Double {
+    type Field = f64;
+    type Bond = f64;
+    const NAME: &str = "double";
+}
+impl Precision for Single {
+    type Field = f32;
+    type Bond = f32;
+    const NAME: &str = "single";
+}
+impl Precision for Mixed {
+    type Field = f64;
+    type Bond = f32;
+    const NAME: &str = "mixed";
+}
+
 /// A vector of the space: position, displacement, force. The unit stands where it is used.
 pub type Vector<const D: usize> = [f64; D];
 
@@ -35,14 +98,14 @@ pub fn difference<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> Vector<D> {
 
 /// The components of a flat field of `N` components.
 #[inline]
-pub fn components<const N: usize>(flat: &[f64]) -> [&[f64]; N] {
+pub fn components<const N: usize, T>(flat: &[T]) -> [&[T]; N] {
     let n = flat.len() / N;
     std::array::from_fn(|k| &flat[k * n..(k + 1) * n])
 }
 
 /// The components of a flat field of `N` components, to be written.
 #[inline]
-pub fn components_mut<const N: usize>(flat: &mut [f64]) -> [&mut [f64]; N] {
+pub fn components_mut<const N: usize, T>(flat: &mut [T]) -> [&mut [T]; N] {
     let n = flat.len() / N;
     let mut rest = flat;
     std::array::from_fn(|_| {
@@ -82,9 +145,9 @@ mod tests {
     #[test]
     fn components_split_a_flat_field_without_overlap() {
         let mut flat = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-        let [x, y, z] = components::<3>(&flat);
+        let [x, y, z] = components::<3, _>(&flat);
         assert_eq!((x, y, z), (&[1.0, 2.0][..], &[3.0, 4.0][..], &[5.0, 6.0][..]));
-        let [_, y] = components_mut::<2>(&mut flat);
+        let [_, y] = components_mut::<2, _>(&mut flat);
         y[0] = 9.0;
         assert_eq!(flat, [1.0, 2.0, 3.0, 9.0, 5.0, 6.0]);
     }

@@ -100,12 +100,17 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
         for p in &mut self.prescribed {
             let c = p.component;
             let [u, v] = [&mut self.state.displacement, &mut self.state.velocity];
-            p.start(0.0, components_mut::<D>(u)[c], components_mut::<D>(v)[c], components::<D>(&self.state.force)[c]);
+            p.start(
+                0.0,
+                components_mut::<D, _>(u)[c],
+                components_mut::<D, _>(v)[c],
+                components::<D, _>(&self.state.force)[c],
+            );
         }
         self.evaluate(0.0, 0.0);
         for p in &mut self.prescribed {
             let c = p.component;
-            let force = components::<D>(&self.state.force)[c];
+            let force = components::<D, _>(&self.state.force)[c];
             for (&slot, last) in p.slots.iter().zip(&mut p.last) {
                 last[2] = force[slot as usize];
             }
@@ -136,7 +141,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
 
     /// Kinetic energy and momentum.
     fn motion(&mut self) -> (f64, [f64; 3]) {
-        let (cloud, velocity) = (&self.body.cloud, components::<D>(&self.state.velocity));
+        let (cloud, velocity) = (&self.body.cloud, components::<D, _>(&self.state.velocity));
         let density = self.physics.density;
         let [square, px, py, pz] = self.exec.sum(cloud.n_points(), |points| {
             let mut sum = [0.0; 4];
@@ -189,7 +194,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
                 ("force density", &self.state.force),
                 ("velocity", &self.state.velocity),
             ] {
-                for component in components::<D>(flat) {
+                for component in components::<D, _>(flat) {
                     let bad = self.body.cloud.slots.iter().position(|&s| !component[s as usize].is_finite());
                     if let Some(point) = bad {
                         let value = component[self.body.cloud.slots[point] as usize];
@@ -202,7 +207,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
         // Kinetic energy cannot pass what came in; a factor of ten leaves room for the error of a coarse step.
         let available = self.ledger.initial + self.ledger.external.abs() + self.state.broken.energy;
         if kinetic > 10.0 * available && clock.step > 2 {
-            let velocity = components::<D>(&self.state.velocity);
+            let velocity = components::<D, _>(&self.state.velocity);
             let speed = |&slot: &u32| velocity.iter().map(|v| v[slot as usize].powi(2)).sum::<f64>();
             let worst = (0..self.body.cloud.n_points())
                 .max_by(|&a, &b| speed(&self.body.cloud.slots[a]).total_cmp(&speed(&self.body.cloud.slots[b])));
@@ -216,7 +221,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
         let mut density = vec![0.0; self.body.cloud.n_slots()];
         self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
         let (cloud, rho) = (&self.body.cloud, self.physics.density);
-        let v = components::<D>(&self.state.velocity);
+        let v = components::<D, _>(&self.state.velocity);
         let n = cloud.n_points();
         let [strain, scale, ..] = self.exec.sum(n, |points| {
             let (mut strain, mut scale) = (0.0, 0.0);
@@ -229,8 +234,8 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
             [strain, scale, 0.0, 0.0]
         });
         let (kinetic, momentum) = self.motion();
-        let (cloud, u) = (&self.body.cloud, components::<D>(&self.state.displacement));
-        let v = components::<D>(&self.state.velocity);
+        let (cloud, u) = (&self.body.cloud, components::<D, _>(&self.state.displacement));
+        let v = components::<D, _>(&self.state.velocity);
         let momentum_of = |slot: usize| -> [f64; 3] {
             let mass = rho * cloud.volume(slot);
             embed::<D>(&std::array::from_fn(|d| mass * v[d][slot]))
@@ -284,7 +289,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
     pub fn field(&mut self, name: &str) -> Option<Field> {
         let slots = &self.body.cloud.slots;
         let vector = |flat: &[f64]| {
-            let parts = components::<D>(flat);
+            let parts = components::<D, _>(flat);
             Values::Vector(slots.iter().map(|&s| embed::<D>(&std::array::from_fn(|d| parts[d][s as usize]))).collect())
         };
         let (name, unit, values) = match name {
@@ -307,7 +312,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         for flat in [&self.state.displacement, &self.state.velocity] {
-            for component in components::<D>(flat) {
+            for component in components::<D, _>(flat) {
                 for &slot in &self.body.cloud.slots {
                     hasher.update(&component[slot as usize].to_le_bytes());
                 }
@@ -340,12 +345,12 @@ impl<const D: usize, L: BondLaw<D>> System for Problem<D, L> {
         let State { displacement, velocity, force, .. } = &mut self.state;
         for p in &mut self.prescribed {
             let c = p.component;
-            let u = components::<D>(displacement)[c];
-            let v = &mut *components_mut::<D>(velocity)[c];
+            let u = components::<D, _>(displacement)[c];
+            let v = &mut *components_mut::<D, _>(velocity)[c];
             match stage {
                 Stage::Drift => p.drift(t, dt, u, v),
                 Stage::Finish => {
-                    let force = components::<D>(force)[c];
+                    let force = components::<D, _>(force)[c];
                     let cloud = &self.body.cloud;
                     let step = Step { t, dt, inertia: self.physics.density, damping: self.damping };
                     let done = p.finish(&step, u, v, force, |slot| cloud.volume(slot));
@@ -361,8 +366,8 @@ impl<const D: usize, L: BondLaw<D>> System for Problem<D, L> {
         let cloud = &self.body.cloud;
         for load in &mut self.loads {
             let c = load.component;
-            let u = components::<D>(&self.state.displacement)[c];
-            let force = &mut *components_mut::<D>(&mut self.state.force)[c];
+            let u = components::<D, _>(&self.state.displacement)[c];
+            let force = &mut *components_mut::<D, _>(&mut self.state.force)[c];
             let done = load.apply(t, dt, u, force, |slot| cloud.volume(slot));
             self.ledger.external += done.work;
             self.ledger.impulse[c] += done.impulse;

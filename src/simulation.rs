@@ -209,7 +209,7 @@ impl<const D: usize, L: BondLaw<D>> Model<D, L> {
         };
         let state_bytes = match &problem.state.states {
             BondStates::Lattice(words) => 2 * words.len(),
-            BondStates::Cloud(bytes) => (1 + 4 * crate::lane::LANES) * bytes.len(),
+            BondStates::Cloud(bytes) => (2 + 4 * crate::family::GROUP) * bytes.len(),
         };
         let fields = (3 * D + 1) * 8 * cloud.n_slots() + 28 * cloud.n_points();
         let memory = (state_bytes + fields + problem.physics.operator.memory()) as u64;

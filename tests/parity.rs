@@ -56,7 +56,7 @@ fn evaluated<const D: usize, L: BondLaw<D>>(
     let mut state = physics.initial_state(body);
     for &slot in &body.cloud.slots {
         let u = displacement(body.cloud.position(slot as usize));
-        for (c, u) in components_mut::<D>(&mut state.displacement).into_iter().zip(u) {
+        for (c, u) in components_mut::<D, _>(&mut state.displacement).into_iter().zip(u) {
             c[slot as usize] = u;
         }
     }
@@ -68,7 +68,7 @@ fn evaluated<const D: usize, L: BondLaw<D>>(
 }
 
 fn forces<const D: usize>(body: &Body<D>, state: &State) -> Vec<[f64; D]> {
-    let parts = components::<D>(&state.force);
+    let parts = components::<D, _>(&state.force);
     body.cloud.slots.iter().map(|&s| parts.map(|c| c[s as usize])).collect()
 }
 

@@ -64,7 +64,7 @@ impl<const D: usize, L: BondLaw<D>> Specimen<D, L> {
         let mut state = self.physics.initial_state(&self.body);
         for (point, &slot) in self.body.cloud.slots.iter().enumerate() {
             let value = u(point, self.body.cloud.position(slot as usize));
-            for (c, value) in components_mut::<D>(&mut state.displacement).into_iter().zip(value) {
+            for (c, value) in components_mut::<D, _>(&mut state.displacement).into_iter().zip(value) {
                 c[slot as usize] = value;
             }
         }
@@ -73,7 +73,7 @@ impl<const D: usize, L: BondLaw<D>> Specimen<D, L> {
 
     fn force(&self, state: &State, point: usize) -> [f64; D] {
         let slot = self.body.cloud.slots[point] as usize;
-        components::<D>(&state.force).map(|c| c[slot])
+        components::<D, _>(&state.force).map(|c| c[slot])
     }
 
     fn volume(&self, point: usize) -> f64 {
@@ -103,7 +103,7 @@ impl<const D: usize, L: BondLaw<D>> Specimen<D, L> {
 
     /// Points whose family is complete.
     fn inner(&self) -> Vec<usize> {
-        let state = self.physics.initial_state(&self.body);
+        let state: State = self.physics.initial_state(&self.body);
         let counts = state.states.per_point(&self.body);
         let Families::Lattice(families) = &self.body.families else { panic!("asked of lattices only") };
         (0..counts.len()).filter(|&p| counts[p] as usize == families.offsets.len()).collect()
@@ -423,14 +423,24 @@ fn a_law_called_from_both_ends_gives_opposite_forces_to_the_last_bit() {
             let xi: [f64; D] = std::array::from_fn(|_| SPACING * random.next());
             let eta: [f64; D] = std::array::from_fn(|_| 0.3 * SPACING * random.next());
             let length = xi.iter().map(|x| x * x).sum::<f64>().sqrt();
-            let here = Bond { xi, length, weight: 3.7e15 };
+            let here = Bond::new(xi, length, 3.7e15);
             let there = Bond { xi: xi.map(|x| -x), ..here };
-            let (a, s): ([f64; D], f64) = law.force(&here, eta);
-            let (b, t): ([f64; D], f64) = law.force(&there, eta.map(|x| -x));
-            assert_eq!(a.map(f64::to_bits), b.map(|f| (-f).to_bits()));
+            let back = eta.map(|x| -x);
+            let (s, t) = (law.strain(&here, &eta), law.strain(&there, &back));
             assert_eq!(s.to_bits(), t.to_bits());
-            let (v, w): (f64, f64) = (law.energy(&here, eta), law.energy(&there, eta.map(|x| -x)));
-            assert_eq!(v.to_bits(), w.to_bits());
+            // Both forms: the small one has a value beyond its range too.
+            for small in [false, true] {
+                let force = |bond: &Bond<D, f64>, eta: &[f64; D]| match small {
+                    true => law.small_force(bond, eta, s, [0.0; D]),
+                    false => law.force(bond, eta, s, [0.0; D]),
+                };
+                assert_eq!(force(&here, &eta).map(f64::to_bits), force(&there, &back).map(|f| (-f).to_bits()));
+                let energy = |bond: &Bond<D, f64>| match small {
+                    true => law.small_energy(bond, s),
+                    false => law.energy(bond, s),
+                };
+                assert_eq!(energy(&here).to_bits(), energy(&there).to_bits());
+            }
         }
     }
     let mut random = Random::new(5);

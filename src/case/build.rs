@@ -151,7 +151,7 @@ impl<const D: usize> Builder<'_, D> {
                 };
                 let path = format!("conditions[{k}].initial.{}.value", motion_name(motion));
                 let mut profile = self.profile(value, &body.cloud, &slots, &path)?;
-                initial::apply(components_mut::<D>(flat)[component], &slots, &mut profile);
+                initial::apply(components_mut::<D, _>(flat)[component], &slots, &mut profile);
             }
             if let Some(motion) = &condition.prescribe {
                 prescribed.push(self.prescribed(k, motion, &body.cloud, slots.clone())?);

@@ -10,7 +10,6 @@ use super::{Influence, PartialVolume};
 use crate::family::{Body, Families};
 use crate::field::{Vector, difference};
 use crate::geometry::Arrangement;
-use crate::lane::LANES;
 
 /// The weights of one law on one body.
 #[derive(Debug, Clone)]
@@ -114,17 +113,16 @@ impl Operator {
 }
 
 impl CloudWeights {
-    /// Replaces the volumes at the other ends of consecutive bonds by the weights of the bonds.
+    /// What volumes are multiplied with where the weight depends on nothing else.
     #[inline]
-    pub fn weigh(&self, first: usize, lengths: &[f64; LANES], volumes: &mut [f64; LANES]) {
-        match (&self.influence, &self.fractions) {
-            (Influence::Constant, Fractions::Full) => volumes.iter_mut().for_each(|v| *v *= self.strength),
-            _ => {
-                for k in 0..LANES {
-                    volumes[k] = self.weight(first + k, lengths[k], volumes[k]);
-                }
-            }
-        }
+    pub fn constant(&self) -> Option<f64> {
+        matches!((&self.influence, &self.fractions), (Influence::Constant, Fractions::Full)).then_some(self.strength)
+    }
+
+    /// A square of length that vanishes beside |ξ|² in the numbers of a precision, m².
+    #[inline]
+    pub fn negligible_square(&self, single: bool) -> f64 {
+        self.horizon * self.horizon * if single { 1e-12 } else { 1e-25 }
     }
 
     /// The weight of bond number `bond`, of length |ξ| (m), to a point of volume V′.

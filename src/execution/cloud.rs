@@ -1,94 +1,247 @@
-//! The loop over families of scattered points: eight bonds of one point side by side.
+//! The loop over families of scattered points: sixteen bonds of one point side by side.
 //!
-//! ξ is recomputed from positions and the weight from |ξ|, so that a bond keeps four bytes of neighbour and one bit of
-//! state. Each point's bonds are added in a fixed order.
+//! Positions and input values are fetched as whole records of a neighbour and transposed in registers; ξ is recomputed
+//! from positions and the weight from |ξ|, so that a bond keeps four bytes of neighbour and one bit of state. Each
+//! point's bonds are added in a fixed order: lane by lane, then the lanes. Forms and breaking are as on lattices, point
+//! by point.
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
+use super::packs::{Between, Ends, Instructions, Pack, Packs, SiteView};
 use super::{BreakRule, Broken, SharedSlice, StatesPointer};
 use crate::discretization::standard::CloudWeights;
-use crate::family::{Body, Bond, BondKernel, CloudFamilies};
-use crate::geometry::Arrangement;
-use crate::lane::{LANES, Lane, Pack};
+use crate::family::{Bond, BondKernel, CloudFamilies, GROUP};
+use crate::field::Number;
 
 /// Points in a chunk: the unit that threads share out, and of the ordered sums.
 pub const CHUNK: usize = 512;
 
-/// Sums the families of a range of points.
-#[allow(clippy::too_many_arguments)]
-pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
-    body: &Body<D>,
-    families: &CloudFamilies,
-    weights: &CloudWeights,
-    points: Range<usize>,
-    states: StatesPointer,
-    input: [&[f64]; I],
-    output: [SharedSlice; O],
-    kernel: &K,
-    rule: &R,
-) -> Broken {
-    let StatesPointer::Cloud(bytes) = states else { unreachable!("a cloud has cloud states") };
-    let Arrangement::Scattered { positions, volumes } = &body.cloud.arrangement else {
-        unreachable!("cloud families belong to a scattered cloud")
-    };
-    let mut broken = Broken::default();
-    for point in points {
-        let x = &positions[point];
-        let mut here = [Pack::splat(0.0); I];
-        for c in 0..I {
-            here[c] = Pack::splat(input[c][point]);
+/// Puts the input values of each point side by side, zeros behind.
+pub fn gather_input<T: Number, const I: usize>(input: &[&[T]; I], records: &mut Vec<[T; 4]>) {
+    if I == 0 {
+        return;
+    }
+    records.resize(input[0].len(), [T::default(); 4]);
+    records.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, records)| {
+        for (k, record) in records.iter_mut().enumerate() {
+            for c in 0..I {
+                record[c] = input[c][chunk * CHUNK + k];
+            }
         }
-        let mut sum = [Pack::splat(0.0); O];
-        for group in families.starts[point] as usize..families.starts[point + 1] as usize {
-            // SAFETY: one byte a group; the groups of a point belong to the chunk that owns the point.
-            let byte = unsafe { &mut *bytes.add(group) };
-            if *byte == 0 {
-                continue;
-            }
-            let neighbours = &families.neighbours[group * LANES..(group + 1) * LANES];
-            let mut bond = Bond { xi: [Pack::splat(0.0); D], length: Pack::splat(0.0), weight: Pack::splat(0.0) };
-            let mut there = here;
-            for k in 0..LANES {
-                let other = neighbours[k] as usize;
-                let mut square = 0.0;
-                for d in 0..D {
-                    let xi = positions[other][d] - x[d];
-                    bond.xi[d].0[k] = xi;
-                    square += xi * xi;
-                }
-                // Padding is the point itself: any length but zero will do, its bit is never set.
-                bond.length.0[k] = if square > 0.0 { square.sqrt() } else { 1.0 };
-                bond.weight.0[k] = volumes[other];
-                for c in 0..I {
-                    there[c].0[k] = input[c][other];
-                }
-            }
-            weights.weigh(group * LANES, &bond.length.0, &mut bond.weight.0);
-            let (value, stretch) = kernel.evaluate(&bond, here, there);
-            if stretch.keep(*byte).largest() > rule.threshold() {
-                for k in 0..LANES {
-                    let (s, other) = (stretch.0[k], neighbours[k] as usize);
-                    let holds = *byte >> k & 1 == 1;
-                    if holds && s > rule.threshold() && rule.breaks(point, other, s) {
-                        let mut xi = [0.0; D];
-                        for d in 0..D {
-                            xi[d] = bond.xi[d].0[k];
-                        }
-                        let bond = Bond { xi, length: bond.length.0[k], weight: bond.weight.0[k] };
-                        *byte &= !(1 << k);
-                        broken.bonds += 1;
-                        broken.energy += volumes[point] * rule.released(&bond, point, other);
+    });
+}
+
+/// A sum over the families of a cloud.
+pub struct Sum<'a, const D: usize, const I: usize, const O: usize, P: Packs, K> {
+    pub instructions: Instructions,
+    pub families: &'a CloudFamilies,
+    pub weights: &'a CloudWeights,
+    pub sites: SiteView<'a, P::Site>,
+    pub states: StatesPointer,
+    /// The input values of a point side by side, zeros behind.
+    pub input: &'a [[P::Field; 4]],
+    pub output: [SharedSlice<P::Field>; O],
+    pub kernel: &'a K,
+}
+
+impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, I, O>> Sum<'_, D, I, O, P, K> {
+    /// Sums the families of a range of points.
+    pub fn run<R: BreakRule<D>>(&self, points: Range<usize>, rule: &R) -> Broken {
+        let threshold = rule.threshold();
+        let mut broken = Broken::default();
+        for point in points {
+            // SAFETY: `Exec::pass` has checked the lengths of all fields; neighbours are points of the cloud; the words
+            // of a point and its slot belong to the chunk that owns the point.
+            unsafe {
+                let mut largest = self.sum::<true>(point);
+                if !R::NEVER && largest > threshold {
+                    let here = self.break_bonds(point, rule);
+                    if here.bonds > 0 {
+                        broken.bonds += here.bonds;
+                        broken.energy += here.energy;
+                        largest = self.sum::<true>(point);
                     }
                 }
+                if largest > K::SMALL {
+                    self.sum::<false>(point);
+                }
             }
-            for c in 0..O {
-                sum[c] = sum[c] + value[c].keep(*byte);
+        }
+        broken
+    }
+
+    compiled!(sum, sum_on, sum_avx2, sum_avx512, [with SMALL: bool], (point: usize), f64);
+    compiled!(break_bonds, break_on, break_avx2, break_avx512, [rule R: BreakRule<D>], (point: usize, rule: &R), Broken);
+
+    /// Sums one family into the output, in the small or the exact form; returns the largest |strain| of its whole bonds.
+    #[inline(always)]
+    unsafe fn sum_on<V, const SMALL: bool>(&self, point: usize) -> f64
+    where
+        V: Pack<P::Bond> + Ends<P::Field> + Between<P::Site>,
+    {
+        let here = unsafe { self.here::<V>(point) };
+        let mut watch = V::splat(0.0);
+        let mut sums = [[V::splat(0.0); O]; GROUP / 4];
+        for group in self.groups(point) {
+            let word = unsafe { *self.words().add(group) };
+            if word == 0 {
+                continue;
+            }
+            for part in 0..GROUP / V::LANES {
+                let mask = word >> (part * V::LANES);
+                let (bond, relative) = unsafe { self.bond::<V>(point, group, part, &here, mask) };
+                let strain = self.kernel.strain(&bond, &relative);
+                watch = watch.larger(strain);
+                let sum = &mut sums[part];
+                let start = if K::RELATIVE { *sum } else { [V::splat(0.0); O] };
+                let mut value = if SMALL {
+                    self.kernel.add_small(&bond, &relative, strain, start)
+                } else {
+                    self.kernel.add(&bond, &relative, strain, start)
+                };
+                if !K::RELATIVE {
+                    for c in 0..O {
+                        value[c] = sum[c] + value[c].keep(mask);
+                    }
+                }
+                *sum = value;
             }
         }
         for c in 0..O {
+            // Lane k is added to lane k + 8, then to k + 4, k + 2, k + 1, however many lanes a pack has.
+            let mut lanes = [P::Bond::default(); GROUP];
+            for part in 0..GROUP / V::LANES {
+                unsafe { sums[part][c].unload(lanes.as_mut_ptr().add(part * V::LANES)) };
+            }
+            let mut width = GROUP / 2;
+            let mut total = lanes.map(Number::to_f64);
+            while width > 0 {
+                for k in 0..width {
+                    total[k] += total[k + width];
+                }
+                width /= 2;
+            }
             // SAFETY: `point` belongs to this chunk alone and the field has the length of the cloud.
-            unsafe { *output[c].0.add(point) = sum[c].sum() };
+            unsafe { *self.output[c].0.add(point) = P::Field::from_f64(total[0]) };
+        }
+        watch.largest()
+    }
+
+    /// Asks each whole bond of a point that is strained beyond the threshold whether it breaks, and clears its bit if so.
+    #[inline(always)]
+    unsafe fn break_on<V, R: BreakRule<D>>(&self, point: usize, rule: &R) -> Broken
+    where
+        V: Pack<P::Bond> + Ends<P::Field> + Between<P::Site>,
+    {
+        let threshold = rule.threshold();
+        let here = unsafe { self.here::<V>(point) };
+        let mut broken = Broken::default();
+        for group in self.groups(point) {
+            let word = unsafe { &mut *self.words().add(group) };
+            for part in 0..GROUP / V::LANES {
+                let (bond, relative) = unsafe { self.bond::<V>(point, group, part, &here, *word >> (part * V::LANES)) };
+                let strain = self.kernel.strain(&bond, &relative);
+                if strain.largest() <= threshold {
+                    continue;
+                }
+                for lane in 0..V::LANES {
+                    let k = part * V::LANES + lane;
+                    let (strain, there) = (strain.lane(lane), self.families.neighbours[group * GROUP + k] as usize);
+                    if *word >> k & 1 == 1 && strain > threshold && rule.breaks(point, there, strain) {
+                        *word &= !(1 << k);
+                        let xi = std::array::from_fn(|d| bond.xi[d].lane(lane));
+                        let bond = Bond::new(xi, bond.length.lane(lane), bond.weight.lane(lane));
+                        broken.bonds += 1;
+                        broken.energy += self.families.sites.records[point][3] * rule.released(&bond, point, there);
+                    }
+                }
+            }
+        }
+        broken
+    }
+
+    fn groups(&self, point: usize) -> Range<usize> {
+        self.families.starts[point] as usize..self.families.starts[point + 1] as usize
+    }
+
+    fn words(&self) -> *mut u16 {
+        self.states.0
+    }
+
+    /// The weights of consecutive bonds, from their lengths and the volumes at their other ends.
+    #[inline(always)]
+    fn weigh<V: Pack<P::Bond>>(&self, first: usize, length: V, volume: V) -> V {
+        let unit = self.sites.volume_unit;
+        if let Some(strength) = self.weights.constant() {
+            return volume * V::splat(strength * unit);
+        }
+        let (mut lengths, mut volumes) = ([P::Bond::default(); GROUP], [P::Bond::default(); GROUP]);
+        // SAFETY: a pack has at most `GROUP` lanes.
+        unsafe {
+            length.unload(lengths.as_mut_ptr());
+            volume.unload(volumes.as_mut_ptr());
+            for k in 0..V::LANES {
+                let weight = self.weights.weight(first + k, lengths[k].to_f64(), volumes[k].to_f64() * unit);
+                volumes[k] = P::Bond::from_f64(weight);
+            }
+            V::load(volumes.as_ptr())
         }
     }
-    broken
+
+    #[inline(always)]
+    unsafe fn here<V: Ends<P::Field>>(&self, point: usize) -> [V::Held; I] {
+        let mut held = [V::NOTHING; I];
+        if I > 0 {
+            let values = unsafe { self.input.get_unchecked(point) };
+            for c in 0..I {
+                held[c] = V::same(values[c]);
+            }
+        }
+        held
+    }
+
+    /// One part of a group of bonds, and the relative values of their ends.
+    #[inline(always)]
+    unsafe fn bond<V>(
+        &self,
+        point: usize,
+        group: usize,
+        part: usize,
+        here: &[V::Held; I],
+        mask: u16,
+    ) -> (Bond<D, V>, [V; I])
+    where
+        V: Pack<P::Bond> + Ends<P::Field> + Between<P::Site>,
+    {
+        let first = group * GROUP + part * V::LANES;
+        let sites = &self.sites;
+        // SAFETY: groups have `GROUP` neighbours, all of them points of the cloud.
+        let (index, between) = unsafe {
+            let index = self.families.neighbours.as_ptr().add(first);
+            let here = *sites.records.get_unchecked(point);
+            (index, V::between(sites.records.as_ptr(), index, here, sites.unit))
+        };
+        let (vector, volume) = between;
+        let mut xi = [V::splat(0.0); D];
+        // Padding is the point itself: any length but zero will do, its bit is never set.
+        let mut square = V::splat(self.weights.negligible_square(V::SINGLE));
+        for d in 0..D {
+            xi[d] = vector[d];
+            square = xi[d].mul_add(xi[d], square);
+        }
+        let inverse = square.inverse_root();
+        let length = square * inverse;
+        let weight = self.weigh::<V>(first, length, volume);
+        let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring: weight * inverse };
+        let mut relative = [V::splat(0.0); I];
+        if I > 0 {
+            let there = unsafe { V::gather(self.input.as_ptr(), index) };
+            for c in 0..I {
+                relative[c] = V::relative(there[c], here[c], mask);
+            }
+        }
+        (bond, relative)
+    }
 }

@@ -1,33 +1,58 @@
 //! The shared-stencil loop: a vector of consecutive points walks through all offsets of the family.
 //!
-//! Each block of sixteen points is summed with its states as masks, while the largest stretch is watched. Only where
-//! that passes the threshold of the break rule is the block asked bond by bond, and summed again if one broke: blocks
-//! away from a crack never are. The body of the loop is compiled for AVX-512, AVX2 and the baseline and chosen at run
-//! time; the three give the same bits, since none fuses multiplications with additions.
+//! Each block of sixteen points is summed in the small form of the kernel with its states as masks, while the largest
+//! |strain| is watched. Only where that passes what the form serves for, or what could break a bond, is the block
+//! looked at again: bonds whose strain passes their limit are broken, and the block is summed anew, exactly if need be.
+//! The strain is computed by the same operations whichever form follows, so that the form can never change which bond
+//! breaks. The body of the loop is compiled for AVX-512, AVX2 and the baseline and chosen at run time.
 
+use super::packs::{Ends, Instructions, Pack, Packs};
 use super::{BreakRule, Broken, SharedSlice, StatesPointer};
 use crate::family::{Body, Bond, BondKernel, LatticeFamilies};
+use crate::field::{Number, Precision};
 use crate::geometry::lattice::BLOCK;
 use crate::geometry::{Arrangement, Lattice};
-use crate::lane::{LANES, Lane, Pack};
+use crate::lane::Lane;
 
 /// Blocks in a chunk: the unit that threads share out, and of the ordered sums. Fixed, whatever the threads.
 const CHUNK: usize = 64;
 
 /// What the loop reads of a body.
-pub struct View<'a, const D: usize> {
+pub struct View<'a, const D: usize, B> {
     lattice: &'a Lattice<D>,
     families: &'a LatticeFamilies<D>,
     weights: &'a [f64],
+    rows: Vec<Row<D, B>>,
 }
 
-impl<'a, const D: usize> View<'a, D> {
+/// One offset in the numbers of the bond arithmetic.
+struct Row<const D: usize, B> {
+    shift: isize,
+    xi: [B; D],
+    length: B,
+    inverse_square: B,
+    weight: B,
+    spring: B,
+}
+
+impl<'a, const D: usize, B: Number> View<'a, D, B> {
     pub fn new(body: &'a Body<D>, families: &'a LatticeFamilies<D>, weights: &'a [f64]) -> Self {
         let Arrangement::Lattice(lattice) = &body.cloud.arrangement else {
             unreachable!("lattice families belong to a lattice")
         };
         assert_eq!(weights.len(), families.offsets.len(), "one weight an offset");
-        View { lattice, families, weights }
+        let rows = families.offsets.iter().zip(weights).map(|(offset, &weight)| {
+            let Bond { xi, length, inverse_square, weight, spring } = Bond::new(offset.xi, offset.length, weight);
+            Row {
+                shift: offset.shift,
+                xi: xi.map(B::from_f64),
+                length: B::from_f64(length),
+                inverse_square: B::from_f64(inverse_square),
+                weight: B::from_f64(weight),
+                spring: B::from_f64(spring),
+            }
+        });
+        View { lattice, families, weights, rows: rows.collect() }
     }
 
     pub fn n_chunks(&self) -> usize {
@@ -35,236 +60,207 @@ impl<'a, const D: usize> View<'a, D> {
     }
 }
 
-/// Sums the blocks of one chunk, on the widest instructions that this machine has.
-pub fn pass<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
-    view: &View<'_, D>,
-    chunk: usize,
-    states: StatesPointer,
-    input: [&[f64]; I],
-    output: [SharedSlice; O],
-    kernel: &K,
-    rule: &R,
-) -> Broken {
-    #[cfg(target_arch = "x86_64")]
-    if K::HOT {
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-            // SAFETY: the features were just detected.
-            return unsafe { pass_avx512(view, chunk, states, input, output, kernel, rule) };
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the feature was just detected.
-            return unsafe { pass_avx2(view, chunk, states, input, output, kernel, rule) };
-        }
-    }
-    pass_plain(view, chunk, states, input, output, kernel, rule)
+/// A sum over the blocks of a lattice.
+pub struct Sum<'a, const D: usize, const I: usize, const O: usize, P: Precision, K> {
+    pub instructions: Instructions,
+    pub view: &'a View<'a, D, P::Bond>,
+    pub states: StatesPointer,
+    pub input: [&'a [P::Field]; I],
+    pub output: [SharedSlice<P::Field>; O],
+    pub kernel: &'a K,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw")]
-fn pass_avx512<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
-    view: &View<'_, D>,
-    chunk: usize,
-    states: StatesPointer,
-    input: [&[f64]; I],
-    output: [SharedSlice; O],
-    kernel: &K,
-    rule: &R,
-) -> Broken {
-    pass_plain(view, chunk, states, input, output, kernel, rule)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn pass_avx2<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
-    view: &View<'_, D>,
-    chunk: usize,
-    states: StatesPointer,
-    input: [&[f64]; I],
-    output: [SharedSlice; O],
-    kernel: &K,
-    rule: &R,
-) -> Broken {
-    pass_plain(view, chunk, states, input, output, kernel, rule)
-}
-
-#[inline(always)]
-fn pass_plain<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
-    view: &View<'_, D>,
-    chunk: usize,
-    states: StatesPointer,
-    input: [&[f64]; I],
-    output: [SharedSlice; O],
-    kernel: &K,
-    rule: &R,
-) -> Broken {
-    let StatesPointer::Lattice(words) = states else { unreachable!("a lattice has lattice states") };
-    let n = view.families.offsets.len();
-    let threshold = rule.threshold();
-    let mut broken = Broken::default();
-    let blocks = &view.families.blocks[chunk * CHUNK..((chunk + 1) * CHUNK).min(view.families.blocks.len())];
-    for &block in blocks {
-        let slot = view.lattice.guard + block as usize * BLOCK;
-        // SAFETY: `block` lies between the guards, so each slot plus each shift is inside the fields, whose length
-        // `Exec::pass` has checked; the words of a block and its slots belong to this chunk alone.
-        unsafe {
-            let words = std::slice::from_raw_parts_mut(words.add(block as usize * n), n);
-            // At most twice: the second sum is of the bonds that the first one showed to break.
-            for again in [true, false] {
-                let stretch = sum_block(view, words, slot, input, output, kernel);
-                if !again || stretch <= threshold {
-                    break;
+impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, I, O>> Sum<'_, D, I, O, P, K> {
+    /// Sums the blocks of one chunk.
+    pub fn run<R: BreakRule<D>>(&self, chunk: usize, rule: &R) -> Broken {
+        let StatesPointer(words) = self.states;
+        let families = self.view.families;
+        let n = families.offsets.len();
+        let threshold = rule.threshold();
+        let mut broken = Broken::default();
+        for &block in &families.blocks[chunk * CHUNK..((chunk + 1) * CHUNK).min(families.blocks.len())] {
+            let slot = self.view.lattice.guard + block as usize * BLOCK;
+            // SAFETY: `block` lies between the guards, so each slot plus each shift is inside the fields, whose length
+            // `Exec::pass` has checked; the words of a block and its slots belong to this chunk alone.
+            unsafe {
+                let words = std::slice::from_raw_parts_mut(words.add(block as usize * n), n);
+                let mut largest = self.sum::<true>(words, slot);
+                if !R::NEVER && largest > threshold {
+                    let here = self.break_bonds(words, slot, rule);
+                    if here.bonds > 0 {
+                        broken.bonds += here.bonds;
+                        broken.energy += here.energy;
+                        largest = self.sum::<true>(words, slot);
+                    }
                 }
-                let here = break_block(view, words, slot, input, kernel, rule);
-                if here.bonds == 0 {
-                    break;
+                if largest > K::SMALL {
+                    self.sum::<false>(words, slot);
                 }
-                broken.bonds += here.bonds;
-                broken.energy += here.energy;
             }
         }
+        broken
     }
-    broken
-}
 
-/// Sums one block into the output; returns the largest stretch of its whole bonds (0 if none is positive).
-#[inline(always)]
-unsafe fn sum_block<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>>(
-    view: &View<'_, D>,
-    words: &[u16],
-    slot: usize,
-    input: [&[f64]; I],
-    output: [SharedSlice; O],
-    kernel: &K,
-) -> f64 {
-    let mut watch = Pack::splat(0.0);
-    for half in 0..BLOCK / LANES {
-        let first = slot + half * LANES;
-        // SAFETY: the slots of a block are inside the input.
-        let here = unsafe { load_all(input, first) };
-        let mut sum = [Pack::splat(0.0); O];
-        let run = Run { view, words, half, first, input, here, kernel };
-        // SAFETY of all four: groups are ranges of offsets.
-        let [pairs, larger] = view.families.groups_by_size();
-        for group in pairs {
-            sum = add(sum, unsafe { run.two(group.start as usize, &mut watch) });
-        }
-        for group in larger {
-            let mut part = [Pack::splat(0.0); O];
-            for k in (group.start as usize..group.end as usize).step_by(4) {
-                let four = unsafe { add(run.two(k, &mut watch), run.two(k + 2, &mut watch)) };
-                part = add(part, four);
-            }
-            sum = add(sum, part);
-        }
-        for c in 0..O {
-            // SAFETY: the slots of a block are inside the output.
-            unsafe { output[c].0.add(first).cast::<[f64; LANES]>().write_unaligned(sum[c].0) };
-        }
-    }
-    watch.largest()
-}
+    compiled!(sum, sum_on, sum_avx2, sum_avx512, [with SMALL: bool], (words: &[u16], slot: usize), f64);
+    compiled!(
+        break_bonds, break_on, break_avx2, break_avx512,
+        [rule R: BreakRule<D>], (words: &mut [u16], slot: usize, rule: &R), Broken
+    );
 
-/// One half of a block on its way through the offsets.
-struct Run<'a, const D: usize, const I: usize, K> {
-    view: &'a View<'a, D>,
-    words: &'a [u16],
-    half: usize,
-    first: usize,
-    input: [&'a [f64]; I],
-    here: [Pack; I],
-    kernel: &'a K,
-}
-
-impl<const D: usize, const I: usize, K> Run<'_, D, I, K> {
+    /// Sums one block into the output, in the small or the exact form; returns the largest |strain| of its whole bonds.
+    ///
+    /// Mirror images of an offset stand in sequences of their own, which are added as a balanced tree: a mirrored body
+    /// has mirrored bits.
     #[inline(always)]
-    unsafe fn one<const O: usize>(&self, k: usize, watch: &mut Pack) -> [Pack; O]
-    where
-        K: BondKernel<D, I, O>,
-    {
-        unsafe {
-            let offset = self.view.families.offsets.get_unchecked(k);
-            let mask = (*self.words.get_unchecked(k) >> (self.half * LANES)) as u8;
-            let there_slot = self.first.wrapping_add_signed(offset.shift);
-            let there = load_all(self.input, there_slot);
-            let mut xi = [Pack::splat(0.0); D];
-            for d in 0..D {
-                xi[d] = Pack::splat(offset.xi[d]);
-            }
-            let bond = Bond {
-                xi,
-                length: Pack::splat(offset.length),
-                weight: Pack::splat(*self.view.weights.get_unchecked(k)),
-            };
-            let (mut value, mut stretch) = self.kernel.evaluate(&bond, self.here, there);
-            if mask != u8::MAX {
-                stretch = stretch.keep(mask);
-                for v in &mut value {
-                    *v = v.keep(mask);
+    unsafe fn sum_on<V: Pack<P::Bond> + Ends<P::Field>, const SMALL: bool>(
+        &self,
+        words: &[u16],
+        slot: usize,
+    ) -> f64 {
+        let mut watch = V::splat(0.0);
+        for part in 0..BLOCK / V::LANES {
+            let first = slot + part * V::LANES;
+            // SAFETY: the slots of a block are inside the input.
+            let here = unsafe { self.hold::<V>(first) };
+            let mut total = [V::splat(0.0); O];
+            for class in &self.view.families.classes {
+                // Partial sums that wait for their mirror image, by the number of sequences in them.
+                let mut waiting = [[V::splat(0.0); O]; 4];
+                let mut k = class.first as usize;
+                for sequence in 0..1 << class.axes {
+                    let mut sum = [V::splat(0.0); O];
+                    for _ in 0..class.members {
+                        // SAFETY: classes are ranges of offsets, and words and rows have one entry an offset.
+                        unsafe {
+                            let bond = self.bond::<V>(k);
+                            let mask = *words.get_unchecked(k) >> (part * V::LANES);
+                            let relative = self.relative::<V>(k, first, &here, mask);
+                            let strain = self.kernel.strain(&bond, &relative);
+                            watch = watch.larger(strain);
+                            let start = if K::RELATIVE { sum } else { [V::splat(0.0); O] };
+                            let mut value = if SMALL {
+                                self.kernel.add_small(&bond, &relative, strain, start)
+                            } else {
+                                self.kernel.add(&bond, &relative, strain, start)
+                            };
+                            if !K::RELATIVE {
+                                for c in 0..O {
+                                    value[c] = sum[c] + value[c].keep(mask);
+                                }
+                            }
+                            sum = value;
+                        }
+                        k += 1;
+                    }
+                    let mut level = 0;
+                    while sequence >> level & 1 == 1 {
+                        sum = add(waiting[level], sum);
+                        level += 1;
+                    }
+                    waiting[level] = sum;
                 }
+                total = add(total, waiting[class.axes as usize]);
             }
-            *watch = watch.max(stretch);
-            value
+            for c in 0..O {
+                // SAFETY: the slots of a block are inside the output.
+                unsafe { total[c].store(self.output[c].0.add(first)) };
+            }
         }
+        watch.largest()
     }
 
-    /// The two members of a mirror pair, added.
+    /// Asks each whole bond of a block that is strained beyond the threshold whether it breaks, and clears its bit if so.
     #[inline(always)]
-    unsafe fn two<const O: usize>(&self, k: usize, watch: &mut Pack) -> [Pack; O]
-    where
-        K: BondKernel<D, I, O>,
-    {
-        unsafe { add(self.one(k, watch), self.one(k + 1, watch)) }
+    unsafe fn break_on<V: Pack<P::Bond> + Ends<P::Field>, R: BreakRule<D>>(
+        &self,
+        words: &mut [u16],
+        slot: usize,
+        rule: &R,
+    ) -> Broken {
+        let volume = self.view.lattice.cell_volume();
+        let threshold = rule.threshold();
+        let mut broken = Broken::default();
+        for part in 0..BLOCK / V::LANES {
+            let first = slot + part * V::LANES;
+            // SAFETY: as in `sum_on`.
+            let here = unsafe { self.hold::<V>(first) };
+            for (k, word) in words.iter_mut().enumerate() {
+                let mask = *word >> (part * V::LANES);
+                // SAFETY: as in `sum_on`.
+                let strain = unsafe {
+                    let relative = self.relative::<V>(k, first, &here, mask);
+                    self.kernel.strain(&self.bond::<V>(k), &relative)
+                };
+                if strain.largest() <= threshold {
+                    continue;
+                }
+                for lane in 0..V::LANES {
+                    let (here, strain) = (first + lane, strain.lane(lane));
+                    let offset = &self.view.families.offsets[k];
+                    let there = here.wrapping_add_signed(offset.shift);
+                    let bit = 1 << (part * V::LANES + lane);
+                    if *word & bit != 0 && strain > threshold && rule.breaks(here, there, strain) {
+                        *word &= !bit;
+                        broken.bonds += 1;
+                        let bond = Bond::new(offset.xi, offset.length, self.view.weights[k]);
+                        broken.energy += volume * rule.released(&bond, here, there);
+                    }
+                }
+            }
+        }
+        broken
+    }
+
+    #[inline(always)]
+    unsafe fn hold<V: Ends<P::Field>>(&self, first: usize) -> [V::Held; I] {
+        let mut held = [V::NOTHING; I];
+        for c in 0..I {
+            held[c] = unsafe { V::hold(self.input[c].as_ptr().add(first)) };
+        }
+        held
+    }
+
+    #[inline(always)]
+    unsafe fn relative<V: Pack<P::Bond> + Ends<P::Field>>(
+        &self,
+        k: usize,
+        first: usize,
+        here: &[V::Held; I],
+        mask: u16,
+    ) -> [V; I] {
+        let mut relative = [V::splat(0.0); I];
+        for c in 0..I {
+            unsafe {
+                let there = self.input[c].as_ptr().add(first).offset(self.view.rows.get_unchecked(k).shift);
+                relative[c] = V::relative(V::hold(there), here[c], mask);
+            }
+        }
+        relative
+    }
+
+    #[inline(always)]
+    unsafe fn bond<V: Pack<P::Bond>>(&self, k: usize) -> Bond<D, V> {
+        let row = unsafe { self.view.rows.get_unchecked(k) };
+        let mut xi = [V::splat(0.0); D];
+        for d in 0..D {
+            xi[d] = V::broadcast(row.xi[d]);
+        }
+        Bond {
+            xi,
+            length: V::broadcast(row.length),
+            inverse_square: V::broadcast(row.inverse_square),
+            weight: V::broadcast(row.weight),
+            spring: V::broadcast(row.spring),
+        }
     }
 }
 
-// Plain loops from here to the law: the closures of `array::map` and `from_fn` are functions of their own, which the
-// compiler does not always inline into code for wider instructions.
-
+// A plain loop: the closures of `array::map` and `from_fn` are functions of their own, which the compiler does not
+// always inline into code for wider instructions.
 #[inline(always)]
-fn add<const O: usize>(mut a: [Pack; O], b: [Pack; O]) -> [Pack; O] {
+fn add<V: Lane, const O: usize>(mut a: [V; O], b: [V; O]) -> [V; O] {
     for c in 0..O {
         a[c] = a[c] + b[c];
     }
     a
-}
-
-#[inline(always)]
-unsafe fn load_all<const I: usize>(fields: [&[f64]; I], slot: usize) -> [Pack; I] {
-    let mut packs = [Pack::splat(0.0); I];
-    for c in 0..I {
-        packs[c] = Pack(unsafe { fields[c].as_ptr().add(slot).cast::<[f64; LANES]>().read_unaligned() });
-    }
-    packs
-}
-
-/// Asks each whole bond of a block whether it breaks, and clears its bit if so.
-#[cold]
-#[inline(never)]
-fn break_block<const D: usize, const I: usize, const O: usize, K: BondKernel<D, I, O>, R: BreakRule<D>>(
-    view: &View<'_, D>,
-    words: &mut [u16],
-    slot: usize,
-    input: [&[f64]; I],
-    kernel: &K,
-    rule: &R,
-) -> Broken {
-    let volume = view.lattice.cell_volume();
-    let mut broken = Broken::default();
-    for (k, word) in words.iter_mut().enumerate() {
-        let offset = &view.families.offsets[k];
-        let bond = Bond { xi: offset.xi, length: offset.length, weight: view.weights[k] };
-        let mut bits = *word;
-        while bits != 0 {
-            let bit = bits.trailing_zeros() as usize;
-            bits &= bits - 1;
-            let (here, there) = (slot + bit, (slot + bit).wrapping_add_signed(offset.shift));
-            let (_, stretch) = kernel.evaluate::<f64>(&bond, input.map(|f| f[here]), input.map(|f| f[there]));
-            if stretch > rule.threshold() && rule.breaks(here, there, stretch) {
-                *word &= !(1 << bit);
-                broken.bonds += 1;
-                broken.energy += volume * rule.released(&bond, here, there);
-            }
-        }
-    }
-    broken
 }

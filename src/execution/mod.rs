@@ -3,8 +3,48 @@
 //! Every point gathers its own family in a fixed order; nothing is scattered, so there are no races and no atomics.
 //! Reductions run over chunks of fixed size that are added in order. The only `unsafe` code of the library is here.
 
+/// Compiles `$generic::<Pack, …>`, a method that is inlined, for each set of instructions, and defines `$name`, which
+/// calls the one that the machine has.
+macro_rules! compiled {
+    (
+        $name:ident, $generic:ident, $avx2:ident, $avx512:ident,
+        [$(with $n:ident: $type:ident)? $(rule $t:ident: $bound:path)?], ($($argument:ident: $of:ty),*), $returns:ty
+    ) => {
+        /// # Safety
+        /// As of the method for all packs; `self.instructions` must be on this machine.
+        #[inline(never)]
+        unsafe fn $name<$(const $n: $type)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
+            // SAFETY: `Instructions` are given out for this machine alone.
+            unsafe {
+                match self.instructions {
+                    #[cfg(target_arch = "x86_64")]
+                    Instructions::Avx512 => self.$avx512::<$($n)? $($t)?>($($argument),*),
+                    #[cfg(target_arch = "x86_64")]
+                    Instructions::Avx2 => self.$avx2::<$($n)? $($t)?>($($argument),*),
+                    Instructions::Baseline => self.$generic::<P::Baseline, $($n)? $($t)?>($($argument),*),
+                }
+            }
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,fma")]
+        #[inline(never)]
+        unsafe fn $avx512<$(const $n: $type)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
+            unsafe { self.$generic::<P::Avx512, $($n)? $($t)?>($($argument),*) }
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2,fma")]
+        #[inline(never)]
+        unsafe fn $avx2<$(const $n: $type)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
+            unsafe { self.$generic::<P::Avx2, $($n)? $($t)?>($($argument),*) }
+        }
+    };
+}
+
 mod cloud;
 mod lattice;
+mod packs;
 
 use std::ops::Range;
 
@@ -12,13 +52,17 @@ use rayon::prelude::*;
 
 use crate::discretization::BondWeights;
 use crate::family::{Body, Bond, BondKernel, BondStates, Families};
+use crate::field::Number;
+pub use packs::{Instructions, Packs};
 
-/// Which bonds break: asked only about bonds stretched beyond `threshold`.
+/// Which bonds break: asked only about bonds strained beyond `threshold`, in the strain of the kernel.
 pub trait BreakRule<const D: usize>: Sync {
-    /// No bond whose stretch is at most this can break.
+    /// Whether no bond ever breaks, so that nothing need be compiled for it.
+    const NEVER: bool = false;
+    /// No bond whose strain is at most this can break.
     fn threshold(&self) -> f64;
-    /// Whether the bond between two slots breaks at this stretch. Must be symmetric in the slots.
-    fn breaks(&self, here: usize, there: usize, stretch: f64) -> bool;
+    /// Whether the bond between two slots breaks at this strain. Must be symmetric in the slots.
+    fn breaks(&self, here: usize, there: usize, strain: f64) -> bool;
     /// Energy that a breaking bond takes with it on this side, J per unit of the point's volume.
     fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64;
 }
@@ -27,6 +71,7 @@ pub trait BreakRule<const D: usize>: Sync {
 pub struct Unbreakable;
 
 impl<const D: usize> BreakRule<D> for Unbreakable {
+    const NEVER: bool = true;
     fn threshold(&self) -> f64 {
         f64::INFINITY
     }
@@ -48,56 +93,76 @@ pub struct Broken {
 }
 
 /// The loops and their scratch memory. Threads are those of the rayon pool in which it is called.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Exec {
+    instructions: Instructions,
     broken: Vec<Broken>,
     partial: Vec<[f64; 4]>,
+    /// Input values of a cloud, a record a point.
+    double: Vec<[f64; 4]>,
+    single: Vec<[f32; 4]>,
+}
+
+impl Default for Exec {
+    /// On the widest instructions that this machine has.
+    fn default() -> Self {
+        Exec::on(*Instructions::available().last().unwrap_or(&Instructions::Baseline))
+    }
 }
 
 /// Points in a chunk of a reduction. Fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 4096;
 
 impl Exec {
+    /// On a set of instructions that [`Instructions::available`] has.
+    ///
+    /// # Panics
+    /// If this machine does not have it.
+    pub fn on(instructions: Instructions) -> Self {
+        assert!(Instructions::available().contains(&instructions), "{instructions:?} is not on this machine");
+        Exec { instructions, broken: Vec::new(), partial: Vec::new(), double: Vec::new(), single: Vec::new() }
+    }
+
     /// output(x) = Σ kernel(bond, input(x), input(x′)) over the bonds of x that hold.
     ///
     /// Every slot of a present point is written; slots without a point are left alone.
-    pub fn sum_bonds<const D: usize, const I: usize, const O: usize>(
+    pub fn sum_bonds<const D: usize, const I: usize, const O: usize, P: Packs>(
         &mut self,
         body: &Body<D>,
         weights: &BondWeights,
         states: &BondStates,
-        input: [&[f64]; I],
-        output: [&mut [f64]; O],
+        input: [&[P::Field]; I],
+        output: [&mut [P::Field]; O],
         kernel: &impl BondKernel<D, I, O>,
     ) {
         // SAFETY of the cast: with `Unbreakable` the loops never write to the states.
         let states = StatesPointer::shared(states);
-        self.pass(body, weights, states, input, output, kernel, &Unbreakable);
+        self.pass::<D, I, O, P>(body, weights, states, input, output, kernel, &Unbreakable);
     }
 
     /// As [`Exec::sum_bonds`], but bonds that `rule` breaks at these input values are broken first, at both ends.
     #[allow(clippy::too_many_arguments)] // the summand, its data and the rule: nothing that belongs in one struct
-    pub fn sum_bonds_and_break<const D: usize, const I: usize, const O: usize>(
+    pub fn sum_bonds_and_break<const D: usize, const I: usize, const O: usize, P: Packs>(
         &mut self,
         body: &Body<D>,
         weights: &BondWeights,
         states: &mut BondStates,
-        input: [&[f64]; I],
-        output: [&mut [f64]; O],
+        input: [&[P::Field]; I],
+        output: [&mut [P::Field]; O],
         kernel: &impl BondKernel<D, I, O>,
         rule: &impl BreakRule<D>,
     ) -> Broken {
-        self.pass(body, weights, StatesPointer::exclusive(states), input, output, kernel, rule)
+        self.pass::<D, I, O, P>(body, weights, StatesPointer::exclusive(states), input, output, kernel, rule)
     }
 
     #[allow(clippy::too_many_arguments)]
-    fn pass<const D: usize, const I: usize, const O: usize>(
+    fn pass<const D: usize, const I: usize, const O: usize, P: Packs>(
         &mut self,
         body: &Body<D>,
         weights: &BondWeights,
         states: StatesPointer,
-        input: [&[f64]; I],
-        output: [&mut [f64]; O],
+        input: [&[P::Field]; I],
+        output: [&mut [P::Field]; O],
         kernel: &impl BondKernel<D, I, O>,
         rule: &impl BreakRule<D>,
     ) -> Broken {
@@ -105,21 +170,31 @@ impl Exec {
         assert!(input.iter().all(|f| f.len() == n), "input fields have the length of the cloud");
         assert!(output.iter().all(|f| f.len() == n), "output fields have the length of the cloud");
         let output = output.map(|f| SharedSlice(f.as_mut_ptr()));
+        let instructions = self.instructions;
         match (&body.families, weights) {
             (Families::Lattice(families), BondWeights::Lattice(weights)) => {
-                let geometry = lattice::View::new(body, families, weights);
-                let chunks = geometry.n_chunks();
-                self.broken.resize(chunks, Broken::default());
-                self.broken.par_iter_mut().enumerate().for_each(|(chunk, broken)| {
-                    *broken = lattice::pass(&geometry, chunk, states, input, output, kernel, rule);
-                });
+                let view = &lattice::View::new(body, families, weights);
+                let sum = lattice::Sum::<D, I, O, P, _> { instructions, view, states, input, output, kernel };
+                self.broken.resize(view.n_chunks(), Broken::default());
+                self.broken.par_iter_mut().enumerate().for_each(|(chunk, broken)| *broken = sum.run(chunk, rule));
             }
             (Families::Cloud(families), BondWeights::Cloud(weights)) => {
-                let chunks = n.div_ceil(cloud::CHUNK);
-                self.broken.resize(chunks, Broken::default());
+                let records = P::records(&mut self.double, &mut self.single);
+                cloud::gather_input(&input, records);
+                let (sites, input) = (P::sites(&families.sites), &records[..]);
+                let sum = cloud::Sum::<D, I, O, P, _> {
+                    instructions,
+                    families,
+                    weights,
+                    sites,
+                    states,
+                    input,
+                    output,
+                    kernel,
+                };
+                self.broken.resize(n.div_ceil(cloud::CHUNK), Broken::default());
                 self.broken.par_iter_mut().enumerate().for_each(|(chunk, broken)| {
-                    let points = chunk * cloud::CHUNK..((chunk + 1) * cloud::CHUNK).min(n);
-                    *broken = cloud::pass(body, families, weights, points, states, input, output, kernel, rule);
+                    *broken = sum.run(chunk * cloud::CHUNK..((chunk + 1) * cloud::CHUNK).min(n), rule);
                 });
             }
             _ => unreachable!("weights are built on the families of their body"),
@@ -141,33 +216,24 @@ impl Exec {
 
 /// An output component that chunks write at disjoint places.
 #[derive(Clone, Copy)]
-struct SharedSlice(*mut f64);
+struct SharedSlice<T>(*mut T);
 // SAFETY: `pass` gives each chunk its own slots, and no slot to two chunks.
-unsafe impl Send for SharedSlice {}
-unsafe impl Sync for SharedSlice {}
+unsafe impl<T: Number> Send for SharedSlice<T> {}
+unsafe impl<T: Number> Sync for SharedSlice<T> {}
 
-/// The bond states, read by all chunks; each chunk writes only the words of its own points.
+/// The words of the bond states, read by all chunks; each chunk writes only those of its own points.
 #[derive(Clone, Copy)]
-enum StatesPointer {
-    Lattice(*mut u16),
-    Cloud(*mut u8),
-}
+struct StatesPointer(*mut u16);
 // SAFETY: as above; a point's words are read and written by the chunk that owns the point alone.
 unsafe impl Send for StatesPointer {}
 unsafe impl Sync for StatesPointer {}
 
 impl StatesPointer {
     fn shared(states: &BondStates) -> Self {
-        match states {
-            BondStates::Lattice(words) => StatesPointer::Lattice(words.as_ptr().cast_mut()),
-            BondStates::Cloud(bytes) => StatesPointer::Cloud(bytes.as_ptr().cast_mut()),
-        }
+        StatesPointer(states.words().as_ptr().cast_mut())
     }
 
     fn exclusive(states: &mut BondStates) -> Self {
-        match states {
-            BondStates::Lattice(words) => StatesPointer::Lattice(words.as_mut_ptr()),
-            BondStates::Cloud(bytes) => StatesPointer::Cloud(bytes.as_mut_ptr()),
-        }
+        StatesPointer(states.words_mut().as_mut_ptr())
     }
 }

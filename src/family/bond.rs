@@ -9,28 +9,71 @@ pub struct Bond<const D: usize, L> {
     pub xi: [L; D],
     /// |ξ|, m.
     pub length: L,
+    /// 1/|ξ|², 1/m².
+    pub inverse_square: L,
     /// The quadrature weight that the discretisation gives the bond: strength × ω × β × V′.
     pub weight: L,
+    /// weight/|ξ|
+    pub spring: L,
+}
+
+impl<const D: usize> Bond<D, f64> {
+    /// One bond, from ξ (m), |ξ| (m) and its weight.
+    pub fn new(xi: [f64; D], length: f64, weight: f64) -> Self {
+        Bond { xi, length, inverse_square: 1.0 / (length * length), weight, spring: weight / length }
+    }
 }
 
 /// A formula along a bond, summed over families by `execution`: the force of a law, its energy, a dilatation.
 ///
 /// `I` values are known at the two ends (displacement, and whatever a later pass of a law adds), `O` are summed.
-/// A kernel allocates nothing and indexes nothing; it is the same source for one bond and for eight side by side.
+/// A kernel allocates nothing and indexes nothing; it is the same source for one bond and for many side by side, in
+/// double and in single precision.
 pub trait BondKernel<const D: usize, const I: usize, const O: usize>: Sync {
-    /// Whether the sum is taken every step, so that it is worth compiling for each set of instructions.
-    const HOT: bool = false;
+    /// |strain| up to which [`BondKernel::add_small`] may stand for [`BondKernel::add`].
+    const SMALL: f64 = f64::INFINITY;
+    /// Whether the summand is zero where the ends have the same values. Broken bonds are given as such, which saves
+    /// a mask; the summands of other kernels are masked.
+    const RELATIVE: bool = true;
 
-    /// The summand of x, given the values here (x) and there (x′), and the stretch of the bond.
-    fn evaluate<L: Lane>(&self, bond: &Bond<D, L>, here: [L; I], there: [L; I]) -> ([L; O], L);
+    /// What decides about breaking and about the form: computed once, whichever form follows. `relative`: values at
+    /// x′ less values at x.
+    fn strain<L: Lane>(&self, bond: &Bond<D, L>, relative: &[L; I]) -> L;
+
+    /// `sum` and the summand of x, exactly.
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, relative: &[L; I], strain: L, sum: [L; O]) -> [L; O];
+
+    /// `sum` and the summand of x where |strain| ≤ `SMALL`, to the precision of the numbers.
+    #[inline(always)]
+    fn add_small<L: Lane>(&self, bond: &Bond<D, L>, relative: &[L; I], strain: L, sum: [L; O]) -> [L; O] {
+        self.add(bond, relative, strain, sum)
+    }
 }
 
-/// A bond law of elasticity: what a bond does when its ends move apart.
+/// A bond law of elasticity: what a bond does when its ends move apart. η = u′ − u, m.
 pub trait BondLaw<const D: usize>: Copy + Send + Sync {
-    /// Force density on x from x′ (N/m³ in 3D, weighted), and the stretch of the bond; η = u′ − u, m.
-    fn force<L: Lane>(&self, bond: &Bond<D, L>, eta: [L; D]) -> ([L; D], L);
+    /// |strain| up to which the small forms serve; infinite where there is one form only.
+    const SMALL: f64 = f64::INFINITY;
+
+    /// How far the bond is strained, in the measure of this law: grows with the stretch, without rounding of its own
+    /// where η is small. A bond breaks when this passes [`BondLaw::strain_at`] its critical stretch.
+    fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L;
+    /// The strain of a bond at stretch s.
+    fn strain_at(&self, stretch: f64) -> f64;
+    /// `sum` and the force density on x from x′ (N/m³ in 3D, weighted).
+    fn force<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D];
     /// Elastic energy density of the bond, weighted: half of it belongs to each end.
-    fn energy<L: Lane>(&self, bond: &Bond<D, L>, eta: [L; D]) -> L;
+    fn energy<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L;
+    /// [`BondLaw::force`] where |strain| ≤ `SMALL`, to the precision of the numbers.
+    #[inline(always)]
+    fn small_force<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
+        self.force(bond, eta, strain, sum)
+    }
+    /// [`BondLaw::energy`] where |strain| ≤ `SMALL`, to the precision of the numbers.
+    #[inline(always)]
+    fn small_energy<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
+        self.energy(bond, strain)
+    }
     /// Spring constant of the bond at rest, weighted: derivative of the force along ξ by η along ξ.
     fn tangent(&self, length: f64, weight: f64) -> f64;
 }

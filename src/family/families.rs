@@ -1,12 +1,12 @@
 //! Families: on a lattice one list of offsets shared by all points, elsewhere a compressed list for each point.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use super::search;
 use crate::field::{Vector, norm};
 use crate::geometry::lattice::BLOCK;
 use crate::geometry::{Arrangement, Cloud, Lattice};
-use crate::lane::LANES;
 
 /// A cloud and its families: what every operator is built on.
 #[derive(Debug, Clone)]
@@ -37,28 +37,94 @@ pub struct Offset<const D: usize> {
     pub length: f64,
 }
 
-/// The shared family of a lattice: offsets, grouped so that each group holds all sign changes of one step.
+/// The shared family of a lattice: offsets in sequences, one for each direction among the octants, faces and axes.
 ///
-/// A sum over a group as a balanced tree is unchanged, to the last bit, when the body is mirrored along an axis; so a
-/// problem that is symmetric stays symmetric.
+/// The sequences of a class are mirror images of each other. Each is summed by itself and their sums are added as a
+/// balanced tree, so that a sum is unchanged, to the last bit, when the body is mirrored along an axis: a problem that is
+/// symmetric stays symmetric.
 #[derive(Debug, Clone)]
 pub struct LatticeFamilies<const D: usize> {
     pub offsets: Vec<Offset<D>>,
-    /// Ranges of `offsets` of 2, 4 or 8 members; those of 2 stand first.
-    pub groups: Vec<Range<u32>>,
-    /// How many groups have 2 members.
-    pub n_pairs: usize,
-    /// Blocks of slots that hold a point, ascending: a sparse body does not pay for its box.
+    pub classes: Vec<Class>,
+    /// Blocks of slots that hold a point, in the order in which they are visited: a sparse body does not pay for its box.
     pub blocks: Vec<u32>,
 }
 
-/// Families of a scattered cloud, each padded to a multiple of [`LANES`] with the point itself (a bond that never
+/// Offsets that point along the same axes: 2^axes sequences, one for each choice of signs, bit by bit from the lowest
+/// axis up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Class {
+    /// The first offset of the first sequence.
+    pub first: u32,
+    /// Offsets in each sequence.
+    pub members: u32,
+    /// 1 to D.
+    pub axes: u32,
+}
+
+/// Neighbours of a point of a cloud that are visited together, and whose bits are one word of states.
+pub const GROUP: usize = 16;
+
+/// Families of a scattered cloud, each padded to a multiple of [`GROUP`] with the point itself (a bond that never
 /// exists), so that a vector of bonds needs no remainder.
 #[derive(Debug, Clone)]
 pub struct CloudFamilies {
-    /// First group of [`LANES`] neighbours of each point, and one past the last.
+    /// First group of [`GROUP`] neighbours of each point, and one past the last.
     pub starts: Vec<u64>,
     pub neighbours: Vec<u32>,
+    pub sites: Sites,
+}
+
+/// Where the points of a cloud are, as the loops read them: a record a point, fetched whole.
+#[derive(Debug, Clone, Default)]
+pub struct Sites {
+    /// x, y, z (zero beyond the dimension; m) and the volume of the point.
+    pub records: Vec<[f64; 4]>,
+    fixed: OnceLock<FixedSites>,
+}
+
+/// The same for single precision. Coordinates are whole multiples of `unit`, so that ξ, a difference of integers, has the
+/// full precision of its numbers wherever the cloud lies.
+#[derive(Debug, Clone)]
+pub struct FixedSites {
+    /// x, y, z in units, and the bits of the volume in its unit as an `f32`.
+    pub records: Vec<[i32; 4]>,
+    /// m
+    pub unit: f64,
+    /// The largest volume, m³.
+    pub volume_unit: f64,
+}
+
+impl Sites {
+    fn new<const D: usize>(positions: &[Vector<D>], volumes: &[f64]) -> Self {
+        let record = |(x, v): (&Vector<D>, &f64)| {
+            let mut record = [0.0, 0.0, 0.0, *v];
+            record[..D].copy_from_slice(x);
+            record
+        };
+        Sites { records: positions.iter().zip(volumes).map(record).collect(), fixed: OnceLock::new() }
+    }
+
+    /// In whole units, made when first asked for.
+    pub fn fixed(&self) -> &FixedSites {
+        self.fixed.get_or_init(|| {
+            let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+            for record in &self.records {
+                for d in 0..3 {
+                    low[d] = low[d].min(record[d]);
+                    high[d] = high[d].max(record[d]);
+                }
+            }
+            let size = (0..3).map(|d| high[d] - low[d]).fold(f64::MIN_POSITIVE, f64::max);
+            let unit = size / f64::from(1 << 30);
+            let volume_unit = self.records.iter().map(|r| r[3]).fold(f64::MIN_POSITIVE, f64::max);
+            let fix = |record: &[f64; 4]| {
+                let [x, y, z] = std::array::from_fn(|d| ((record[d] - low[d]) / unit).round() as i32);
+                [x, y, z, ((record[3] / volume_unit) as f32).to_bits().cast_signed()]
+            };
+            FixedSites { records: self.records.iter().map(fix).collect(), unit, volume_unit }
+        })
+    }
 }
 
 impl<const D: usize> Body<D> {
@@ -70,7 +136,11 @@ impl<const D: usize> Body<D> {
             Arrangement::Lattice(lattice) => {
                 Families::Lattice(LatticeFamilies::new(lattice, &cloud.slots, reach, accept))
             }
-            Arrangement::Scattered { positions, .. } => Families::Cloud(search::families(positions, reach, accept)),
+            Arrangement::Scattered { positions, volumes } => {
+                let mut families = search::families(positions, reach, accept);
+                families.sites = Sites::new(positions, volumes);
+                Families::Cloud(families)
+            }
         };
         Body { cloud, families, horizon }
     }
@@ -80,48 +150,64 @@ impl<const D: usize> LatticeFamilies<D> {
     fn new(lattice: &Lattice<D>, slots: &[u32], reach: f64, accept: impl Fn(&Vector<D>) -> bool) -> Self {
         let h = lattice.spacing;
         let n = (reach / h).ceil() as i32;
-        let mut classes: Vec<[i32; D]> = Vec::new();
+        // Steps with no negative component: each stands for its mirror images.
+        let mut steps: Vec<[i32; D]> = Vec::new();
         crate::geometry::cloud::for_each_cell([n as usize + 1; D], |cell| {
             let step = cell.map(|c| c as i32);
             let xi = step.map(|c| f64::from(c) * h);
             if step != [0; D] && norm(&xi) <= reach && accept(&xi) {
-                classes.push(step);
+                steps.push(step);
             }
         });
-        let axes_of = |step: &[i32; D]| step.iter().filter(|c| **c != 0).count();
-        classes.sort_by_key(|step| (axes_of(step) > 1, step.iter().map(|c| c * c).sum::<i32>(), *step));
-        let n_pairs = classes.iter().filter(|step| axes_of(step) == 1).count();
-        let (mut offsets, mut groups) = (Vec::new(), Vec::new());
-        for class in classes {
+        let axes_of = |step: &[i32; D]| (0..D).filter(|&d| step[d] != 0).fold(0u32, |bits, d| bits | 1 << d);
+        steps.sort_by_key(|step| (axes_of(step), step.iter().map(|c| c * c).sum::<i32>(), *step));
+        let (mut offsets, mut classes) = (Vec::new(), Vec::new());
+        for members in steps.chunk_by(|a, b| axes_of(a) == axes_of(b)) {
+            let axes: Vec<usize> = (0..D).filter(|&d| members[0][d] != 0).collect();
             let first = offsets.len() as u32;
-            let axes: Vec<usize> = (0..D).filter(|&d| class[d] != 0).collect();
             for signs in 0..1u32 << axes.len() {
-                let mut step = class;
-                for (k, &d) in axes.iter().enumerate() {
-                    if signs >> k & 1 == 1 {
-                        step[d] = -step[d];
+                for member in members {
+                    let mut step = *member;
+                    for (k, &d) in axes.iter().enumerate() {
+                        if signs >> k & 1 == 1 {
+                            step[d] = -step[d];
+                        }
                     }
+                    let xi = step.map(|c| f64::from(c) * h);
+                    let shift = (0..D).map(|d| step[d] as isize * lattice.strides[d] as isize).sum();
+                    offsets.push(Offset { step, shift, xi, length: norm(&xi) });
                 }
-                let xi = step.map(|c| f64::from(c) * h);
-                let shift = (0..D).map(|d| step[d] as isize * lattice.strides[d] as isize).sum();
-                offsets.push(Offset { step, shift, xi, length: norm(&xi) });
             }
-            groups.push(first..offsets.len() as u32);
+            classes.push(Class { first, members: members.len() as u32, axes: axes.len() as u32 });
         }
         let mut blocks: Vec<u32> = slots.iter().map(|&s| ((s as usize - lattice.guard) / BLOCK) as u32).collect();
         blocks.dedup();
-        LatticeFamilies { offsets, groups, n_pairs, blocks }
+        tile(lattice, n as usize, &mut blocks);
+        LatticeFamilies { offsets, classes, blocks }
     }
 }
 
-impl<const D: usize> LatticeFamilies<D> {
-    /// The groups of two members, and the larger ones.
-    #[inline(always)]
-    pub fn groups_by_size(&self) -> [&[Range<u32>]; 2] {
-        let (pairs, larger) = self.groups.split_at(self.n_pairs);
-        [pairs, larger]
-    }
+/// Bytes of a field that the rows of a tile may take in all planes that its families reach: half of a small second-level
+/// cache, for three components of eight bytes.
+const TILE_BYTES: usize = 512 * 1024;
 
+/// Puts the blocks of a solid in the order of tiles of rows, each tile plane by plane, so that the planes that its
+/// families reach stay in the cache while it is swept.
+fn tile<const D: usize>(lattice: &Lattice<D>, reach: usize, blocks: &mut [u32]) {
+    if D < 3 {
+        return;
+    }
+    let row = lattice.strides[1];
+    let planes = 2 * reach + 1;
+    let rows = (TILE_BYTES / (planes * row * 3 * size_of::<f64>())).saturating_sub(2 * reach).max(8);
+    let (row_blocks, n_rows) = ((row / BLOCK) as u32, lattice.counts[1] as u32);
+    blocks.sort_by_cached_key(|block| {
+        let (y, z) = (block / row_blocks % n_rows, block / row_blocks / n_rows);
+        (y / rows as u32, z, *block)
+    });
+}
+
+impl<const D: usize> LatticeFamilies<D> {
     /// |ξ| of the longest bond, m.
     pub fn longest(&self) -> f64 {
         self.offsets.iter().map(|o| o.length).fold(0.0, f64::max)
@@ -132,7 +218,7 @@ impl CloudFamilies {
     /// The neighbours of a point with the index of their bond, padding included.
     #[inline]
     pub fn of(&self, point: usize) -> Range<usize> {
-        self.starts[point] as usize * LANES..self.starts[point + 1] as usize * LANES
+        self.starts[point] as usize * GROUP..self.starts[point + 1] as usize * GROUP
     }
 }
 
@@ -142,17 +228,23 @@ mod tests {
     use crate::geometry::Shape;
 
     #[test]
-    fn offsets_of_a_lattice_are_the_points_of_a_ball_in_mirror_groups() {
+    fn offsets_of_a_lattice_are_the_points_of_a_ball_in_mirror_sequences() {
         let cube = Shape::Box { low: [0.0; 3], high: [1.0; 3] };
         let body = Body::new(Cloud::lattice(&cube, 0.1, 3), 0.3, 0.3 * (1.0 + 1e-9), |_| true);
         let Families::Lattice(families) = &body.families else { panic!("a lattice") };
         assert_eq!(families.offsets.len(), 122);
-        for group in &families.groups {
-            let members = &families.offsets[group.start as usize..group.end as usize];
-            assert!([2, 4, 8].contains(&members.len()));
-            for other in members {
-                assert_eq!(other.step.map(i32::abs), members[0].step.map(i32::abs));
+        let mut next = 0;
+        for class in &families.classes {
+            assert_eq!(class.first, next);
+            let members = class.members as usize;
+            for sequence in 0..1 << class.axes {
+                for k in 0..members {
+                    let [image, original] = [sequence * members + k, k].map(|k| &families.offsets[next as usize + k]);
+                    assert_eq!(image.step.map(i32::abs), original.step);
+                }
             }
+            next += class.members << class.axes;
         }
+        assert_eq!(next, 122);
     }
 }

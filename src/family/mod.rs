@@ -6,5 +6,5 @@ pub mod search;
 pub mod states;
 
 pub use bond::{Bond, BondKernel, BondLaw};
-pub use families::{Body, CloudFamilies, Families, LatticeFamilies, Offset};
+pub use families::{Body, Class, CloudFamilies, Families, FixedSites, GROUP, LatticeFamilies, Offset, Sites};
 pub use states::BondStates;

@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::CloudFamilies;
+use super::{CloudFamilies, GROUP, Sites};
 use crate::field::{Vector, difference, dot, norm};
-use crate::lane::LANES;
 
 /// Points sorted into cubic cells of side `reach`: the candidates of a point lie in the 3^D cells around it.
 pub struct Cells<const D: usize> {
@@ -99,14 +98,14 @@ pub fn families<const D: usize>(
     let mut total = 0;
     starts.push(0);
     for n in counts {
-        total += n.div_ceil(LANES as u64);
+        total += n.div_ceil(GROUP as u64);
         starts.push(total);
     }
-    let mut neighbours = vec![0; total as usize * LANES];
+    let mut neighbours = vec![0; total as usize * GROUP];
     let mut rest = neighbours.as_mut_slice();
     let mut rows = Vec::with_capacity(positions.len());
     for i in 0..positions.len() {
-        let (row, tail) = rest.split_at_mut((starts[i + 1] - starts[i]) as usize * LANES);
+        let (row, tail) = rest.split_at_mut((starts[i + 1] - starts[i]) as usize * GROUP);
         rows.push(row);
         rest = tail;
     }
@@ -121,7 +120,7 @@ pub fn families<const D: usize>(
         row[..n].sort_unstable();
         row[n..].fill(i as u32);
     });
-    CloudFamilies { starts, neighbours }
+    CloudFamilies { starts, neighbours, sites: Sites::default() }
 }
 
 #[cfg(test)]

@@ -1,21 +1,20 @@
 //! The state of each bond: one bit, set while the bond holds.
 //!
 //! On a lattice the bits of [`BLOCK`] consecutive slots and one offset are one word, so that a vector's mask is one
-//! load; on a cloud the bits of [`LANES`] consecutive bonds are one byte. A bond has two bits, one at each end, which
+//! load; on a cloud so are the bits of [`GROUP`] consecutive bonds of one point. A bond has two bits, one at each end, which
 //! each end's own sum reads and clears; both ends see the same stretch to the last bit and so decide alike.
 
-use super::{Body, Families};
+use super::{Body, Families, GROUP};
 use crate::geometry::lattice::BLOCK;
 use crate::geometry::{Arrangement, Crack};
-use crate::lane::LANES;
 
 /// One bit for each directed bond.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum BondStates {
     /// `words[block * offsets + offset]`
     Lattice(Vec<u16>),
-    /// `bytes[group of LANES bonds]`
-    Cloud(Vec<u8>),
+    /// `words[group of bonds]`
+    Cloud(Vec<u16>),
 }
 
 impl BondStates {
@@ -57,15 +56,15 @@ impl BondStates {
                 BondStates::Lattice(words)
             }
             (_, Families::Cloud(families)) => {
-                let mut bytes = vec![0u8; families.neighbours.len() / LANES];
+                let mut words = vec![0u16; families.neighbours.len() / GROUP];
                 for point in 0..body.cloud.n_points() {
                     for bond in families.of(point) {
                         if families.neighbours[bond] as usize != point {
-                            bytes[bond / LANES] |= 1 << (bond % LANES);
+                            words[bond / GROUP] |= 1 << (bond % GROUP);
                         }
                     }
                 }
-                BondStates::Cloud(bytes)
+                BondStates::Cloud(words)
             }
             _ => unreachable!("families are built from the arrangement of their cloud"),
         }
@@ -73,10 +72,7 @@ impl BondStates {
 
     /// Directed bonds that hold.
     pub fn count(&self) -> u64 {
-        match self {
-            BondStates::Lattice(words) => words.iter().map(|w| u64::from(w.count_ones())).sum(),
-            BondStates::Cloud(bytes) => bytes.iter().map(|b| u64::from(b.count_ones())).sum(),
-        }
+        self.words().iter().map(|w| u64::from(w.count_ones())).sum()
     }
 
     /// Bonds of each point that hold, in point order.
@@ -91,22 +87,30 @@ impl BondStates {
                 };
                 slots.map(count).collect()
             }
-            (BondStates::Cloud(bytes), Families::Cloud(families), _) => slots
+            (BondStates::Cloud(words), Families::Cloud(families), _) => slots
                 .map(|p| {
                     let groups = families.starts[p] as usize..families.starts[p + 1] as usize;
-                    bytes[groups].iter().map(|b| b.count_ones()).sum()
+                    words[groups].iter().map(|w| w.count_ones()).sum()
                 })
                 .collect(),
             _ => unreachable!("states are built from the families of their body"),
         }
     }
 
-    /// The raw words, for hashing and saving.
+    /// The words, one a block and offset of a lattice, one a group of a cloud.
+    pub fn words(&self) -> &[u16] {
+        let (BondStates::Lattice(words) | BondStates::Cloud(words)) = self;
+        words
+    }
+
+    pub fn words_mut(&mut self) -> &mut [u16] {
+        let (BondStates::Lattice(words) | BondStates::Cloud(words)) = self;
+        words
+    }
+
+    /// The words as bytes, for hashing and saving.
     pub fn bytes(&self) -> Vec<u8> {
-        match self {
-            BondStates::Lattice(words) => words.iter().flat_map(|w| w.to_le_bytes()).collect(),
-            BondStates::Cloud(bytes) => bytes.clone(),
-        }
+        self.words().iter().flat_map(|w| w.to_le_bytes()).collect()
     }
 
     /// Breaks every bond that `crack` cuts; returns how many directed bonds it broke. `tolerance` in m: what counts
@@ -143,11 +147,11 @@ impl BondStates {
                     }
                 }
             }
-            (BondStates::Cloud(bytes), Families::Cloud(families), _) => {
+            (BondStates::Cloud(words), Families::Cloud(families), _) => {
                 for bond in families.of(slot) {
-                    let byte = &mut bytes[bond / LANES];
-                    if *byte >> (bond % LANES) & 1 == 1 && !keep(families.neighbours[bond] as usize) {
-                        *byte &= !(1 << (bond % LANES));
+                    let word = &mut words[bond / GROUP];
+                    if *word >> (bond % GROUP) & 1 == 1 && !keep(families.neighbours[bond] as usize) {
+                        *word &= !(1 << (bond % GROUP));
                     }
                 }
             }

@@ -12,6 +12,7 @@ use crate::execution::Exec;
 use crate::family::Families;
 use crate::output::plot::{Plot, Series, Style, draw_plot};
 use crate::physics::Elasticity;
+use crate::physics::elasticity::State;
 use crate::physics::elasticity::bond_based::BondBasedLinear;
 use crate::physics::elasticity::moduli::{Hypothesis, critical_stretch, micromodulus};
 
@@ -50,7 +51,7 @@ fn from_bond_sums<const D: usize>(hypothesis: Hypothesis, rule: PartialVolume, m
     let physics = Elasticity { law: BondBasedLinear, density: 1.0, operator, failure: None };
     let mut exec = Exec::default();
     let mut energy = |strain: [f64; 2]| {
-        let mut state = physics.initial_state(&body);
+        let mut state: State = physics.initial_state(&body);
         let n = body.cloud.n_slots();
         for &slot in &body.cloud.slots {
             let x = body.cloud.position(slot as usize);

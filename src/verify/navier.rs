@@ -96,10 +96,11 @@ fn integrated<const D: usize>(hypothesis: Hypothesis, influence: &Influence, ent
         for (n, angular) in &directions {
             let xi = n.map(|n| n * t * HORIZON);
             let weight = c * influence.value(t) * shell * angular;
-            let bond = Bond { xi, length: t * HORIZON, weight };
+            let bond = Bond::new(xi, t * HORIZON, weight);
             let mut eta = [0.0; D];
             eta[entry.j] = xi[entry.a] * xi[entry.b];
-            let (force, _): ([f64; D], f64) = BondBasedLinear.force(&bond, eta);
+            let strain = BondBasedLinear.strain(&bond, &eta);
+            let force = BondBasedLinear.force(&bond, &eta, strain, [0.0; D]);
             sum += force[entry.i];
         }
     }

@@ -5,64 +5,117 @@
 //! plane stress, 1/4 in plane strain and in 3D.
 
 use crate::family::{Bond, BondLaw};
-use crate::lane::Lane;
+use crate::lane::{Lane, polynomial};
 
 /// Large displacements: f = ω c s (ξ + η)/|ξ + η|, s = (|ξ + η| − |ξ|)/|ξ|; eqs. (11), (15).
 ///
-/// s is computed as (2ξ + η)·η / (|ξ| (|ξ + η| + |ξ|)), which keeps its digits however small η is.
+/// The strain is q = (|ξ + η|² − |ξ|²)/|ξ|² = (2ξ + η)·η/|ξ|², which keeps its digits however small η is. With it
+/// s = √(1 + q) − 1 and f = ω c/|ξ| (1 − 1/√(1 + q)) (ξ + η): smooth functions of q, for which polynomials serve where
+/// |q| ≤ 0.01, that is stretches of half a percent.
 #[derive(Debug, Clone, Copy)]
 pub struct BondBased;
 
-/// Small displacements: f = ω c (ξ ⊗ ξ)/|ξ|³ η, s = ξ·η/|ξ|²; eq. (16).
+/// Small displacements: f = ω c (ξ ⊗ ξ)/|ξ|³ η, s = ξ·η/|ξ|²; eq. (16). The strain is s.
 #[derive(Debug, Clone, Copy)]
 pub struct BondBasedLinear;
 
 impl<const D: usize> BondLaw<D> for BondBased {
+    const SMALL: f64 = 0.01;
+
     #[inline(always)]
-    fn force<L: Lane>(&self, bond: &Bond<D, L>, eta: [L; D]) -> ([L; D], L) {
-        let q = elongation(bond, eta);
-        let length = bond.length;
-        let r = (length * length + q).sqrt();
-        let inverse = L::splat(1.0) / (length * (r + length) * r);
-        let stretch = q * inverse * r;
-        let g = bond.weight * q * inverse;
-        let mut force = eta;
-        for d in 0..D {
-            force[d] = g * (bond.xi[d] + eta[d]);
+    fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
+        let mut square = eta[0] * (bond.xi[0] + (bond.xi[0] + eta[0]));
+        for d in 1..D {
+            square = eta[d].mul_add(bond.xi[d] + (bond.xi[d] + eta[d]), square);
         }
-        (force, stretch)
+        square * bond.inverse_square
+    }
+
+    fn strain_at(&self, stretch: f64) -> f64 {
+        stretch * (2.0 + stretch)
     }
 
     #[inline(always)]
-    fn energy<L: Lane>(&self, bond: &Bond<D, L>, eta: [L; D]) -> L {
-        let q = elongation(bond, eta);
-        let length = bond.length;
-        let r = (length * length + q).sqrt();
-        let stretch = q / (length * (r + length));
-        L::splat(0.5) * bond.weight * stretch * stretch * length
+    fn force<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
+        let square = L::splat(1.0) + strain;
+        along_deformed(bond, eta, bond.spring * strain / (square + square.sqrt()), sum)
+    }
+
+    #[inline(always)]
+    fn small_force<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
+        let series = if L::SINGLE { polynomial(FORCE_SINGLE, strain) } else { polynomial(FORCE, strain) };
+        along_deformed(bond, eta, bond.spring * strain * series, sum)
+    }
+
+    #[inline(always)]
+    fn energy<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
+        let one = L::splat(1.0);
+        spring_energy(bond, strain / (one + (one + strain).sqrt()))
+    }
+
+    #[inline(always)]
+    fn small_energy<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
+        let series = if L::SINGLE { polynomial(STRETCH_SINGLE, strain) } else { polynomial(STRETCH, strain) };
+        spring_energy(bond, strain * series)
     }
 
     fn tangent(&self, length: f64, weight: f64) -> f64 {
         weight / length
     }
 }
+
+/// (1 − 1/√(1 + q))/q on |q| ≤ 0.01: interpolated at the zeros of the Chebyshev polynomial T₇, relative error 6e-17.
+const FORCE: [f64; 7] = [
+    0.5,
+    -0.3750000000000215,
+    0.31250000000002026,
+    -0.27343749828141906,
+    0.24609374837689324,
+    -0.2256203079623644,
+    0.2095051172811721,
+];
+/// The same for single precision: the first terms of Taylor's series, relative error 5e-9.
+const FORCE_SINGLE: [f64; 4] = [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 128.0];
+
+/// (√(1 + q) − 1)/q on |q| ≤ 0.01, as [`FORCE`]: relative error 4e-18.
+const STRETCH: [f64; 7] = [
+    0.5,
+    -0.12500000000000144,
+    0.0625000000000012,
+    -0.03906249988543145,
+    0.027343749904525812,
+    -0.020510103810053047,
+    0.016115190681192295,
+];
+/// The same for single precision: relative error 5e-10.
+const STRETCH_SINGLE: [f64; 4] = [1.0 / 2.0, -1.0 / 8.0, 1.0 / 16.0, -5.0 / 128.0];
 
 impl<const D: usize> BondLaw<D> for BondBasedLinear {
     #[inline(always)]
-    fn force<L: Lane>(&self, bond: &Bond<D, L>, eta: [L; D]) -> ([L; D], L) {
-        let stretch = along(bond, eta) / (bond.length * bond.length);
-        let g = bond.weight * stretch / bond.length;
-        let mut force = bond.xi;
-        for d in 0..D {
-            force[d] = g * bond.xi[d];
+    fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
+        let mut along = eta[0] * bond.xi[0];
+        for d in 1..D {
+            along = eta[d].mul_add(bond.xi[d], along);
         }
-        (force, stretch)
+        along * bond.inverse_square
+    }
+
+    fn strain_at(&self, stretch: f64) -> f64 {
+        stretch
     }
 
     #[inline(always)]
-    fn energy<L: Lane>(&self, bond: &Bond<D, L>, eta: [L; D]) -> L {
-        let stretch = along(bond, eta) / (bond.length * bond.length);
-        L::splat(0.5) * bond.weight * stretch * stretch * bond.length
+    fn force<L: Lane>(&self, bond: &Bond<D, L>, _eta: &[L; D], strain: L, mut sum: [L; D]) -> [L; D] {
+        let factor = bond.spring * strain;
+        for d in 0..D {
+            sum[d] = factor.mul_add(bond.xi[d], sum[d]);
+        }
+        sum
+    }
+
+    #[inline(always)]
+    fn energy<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
+        spring_energy(bond, strain)
     }
 
     fn tangent(&self, length: f64, weight: f64) -> f64 {
@@ -70,49 +123,81 @@ impl<const D: usize> BondLaw<D> for BondBasedLinear {
     }
 }
 
-/// |ξ + η|² − |ξ|² = (2ξ + η)·η
+/// sum + factor (ξ + η)
 #[inline(always)]
-fn elongation<const D: usize, L: Lane>(bond: &Bond<D, L>, eta: [L; D]) -> L {
-    let mut q = eta[0] * (bond.xi[0] + (bond.xi[0] + eta[0]));
-    for d in 1..D {
-        q = q + eta[d] * (bond.xi[d] + (bond.xi[d] + eta[d]));
+fn along_deformed<const D: usize, L: Lane>(bond: &Bond<D, L>, eta: &[L; D], factor: L, mut sum: [L; D]) -> [L; D] {
+    for d in 0..D {
+        sum[d] = factor.mul_add(bond.xi[d] + eta[d], sum[d]);
     }
-    q
+    sum
 }
 
-/// ξ·η
+/// ½ ω c s² |ξ|
 #[inline(always)]
-fn along<const D: usize, L: Lane>(bond: &Bond<D, L>, eta: [L; D]) -> L {
-    let mut q = eta[0] * bond.xi[0];
-    for d in 1..D {
-        q = q + eta[d] * bond.xi[d];
-    }
-    q
+fn spring_energy<const D: usize, L: Lane>(bond: &Bond<D, L>, stretch: L) -> L {
+    L::splat(0.5) * bond.weight * bond.length * (stretch * stretch)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Force and energy of one bond, in both forms: `small` picks the second.
+    fn response<const D: usize>(
+        law: impl BondLaw<D>,
+        bond: &Bond<D, f64>,
+        eta: [f64; D],
+        small: bool,
+    ) -> ([f64; D], f64) {
+        let strain = law.strain(bond, &eta);
+        if small {
+            (law.small_force(bond, &eta, strain, [0.0; D]), law.small_energy(bond, strain))
+        } else {
+            (law.force(bond, &eta, strain, [0.0; D]), law.energy(bond, strain))
+        }
+    }
+
     #[test]
-    fn force_is_the_derivative_of_energy_and_stretch_keeps_its_digits() {
-        let bond = Bond { xi: [3.0e-3, -1.0e-3, 2.0e-3], length: 14f64.sqrt() * 1e-3, weight: 7.0 };
-        let eta = [2.0e-4, 5.0e-5, -1.0e-4];
-        let check = |force: [f64; 3], energy: &dyn Fn([f64; 3]) -> f64| {
+    fn force_is_the_derivative_of_energy_and_strain_keeps_its_digits() {
+        fn check(law: impl BondLaw<3>, eta: [f64; 3], small: bool) {
+            let bond = Bond::new([3.0e-3, -1.0e-3, 2.0e-3], 14f64.sqrt() * 1e-3, 7.0);
+            let (force, _) = response(law, &bond, eta, small);
             for d in 0..3 {
                 let h = 1e-9;
                 let (mut plus, mut minus) = (eta, eta);
                 plus[d] += h;
                 minus[d] -= h;
+                let energy = |eta| response(law, &bond, eta, small).1;
                 let slope = (energy(plus) - energy(minus)) / (2.0 * h);
                 // Truncation h²/|ξ|² ≈ 1e-13 and round-off 1e-16 |ξ|/h ≈ 4e-10 of the difference quotient.
                 assert!((slope - force[d]).abs() < 1e-8 * force[0].abs(), "{d}: {slope} {}", force[d]);
             }
-        };
-        check(BondBased.force(&bond, eta).0, &|e| BondBased.energy(&bond, e));
-        check(BondBasedLinear.force(&bond, eta).0, &|e| BondBasedLinear.energy(&bond, e));
-        let tiny = bond.xi.map(|x| 1e-14 * x);
-        let (_, stretch): ([f64; 3], f64) = BondBased.force(&bond, tiny);
-        assert!((stretch / 1e-14 - 1.0).abs() < 1e-12);
+            let tiny = bond.xi.map(|x| 1e-14 * x);
+            assert!((law.strain(&bond, &tiny) / law.strain_at(1e-14) - 1.0).abs() < 1e-12);
+        }
+        check(BondBased, [2.0e-4, 5.0e-5, -1.0e-4], false);
+        check(BondBased, [1.0e-5, 5.0e-6, -4.0e-6], true);
+        check(BondBasedLinear, [2.0e-4, 5.0e-5, -1.0e-4], false);
+    }
+
+    #[test]
+    fn small_forms_are_the_exact_ones_to_rounding() {
+        let bond = Bond::new([1.0], 1.0, 1.0);
+        for k in -1000..=1000 {
+            let q = 1e-5 * f64::from(k);
+            // η along ξ that gives the strain q; the exact form in a way that does not cancel.
+            let eta = [q / (1.0 + (1.0 + q).sqrt())];
+            let strain = BondBased.strain(&bond, &eta);
+            let ([f], e) = response(BondBased, &bond, eta, true);
+            let ([exact_f], exact_e) = response(BondBased, &bond, eta, false);
+            assert!((strain - q).abs() <= 2.0 * f64::EPSILON * q.abs(), "{strain} {q}");
+            // Four roundings of each form, and 6e-17 of the polynomial.
+            assert!((f - exact_f).abs() <= 4.0 * f64::EPSILON * exact_f.abs(), "q {q}: {f} {exact_f}");
+            assert!((e - exact_e).abs() <= 4.0 * f64::EPSILON * exact_e.abs(), "q {q}: {e} {exact_e}");
+            let single = (polynomial(FORCE_SINGLE, q) / polynomial(FORCE, q) - 1.0).abs();
+            assert!(single < 0.1 * f64::from(f32::EPSILON), "q {q}: {single}");
+            let single = (polynomial(STRETCH_SINGLE, q) / polynomial(STRETCH, q) - 1.0).abs();
+            assert!(single < 0.1 * f64::from(f32::EPSILON), "q {q}: {single}");
+        }
     }
 }

@@ -6,9 +6,9 @@ pub mod bond_based;
 pub mod moduli;
 
 use crate::discretization::{BondWeights, Operator};
-use crate::execution::{BreakRule, Broken, Exec};
+use crate::execution::{BreakRule, Broken, Exec, Packs};
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
-use crate::field::{components, components_mut, difference, dot, norm};
+use crate::field::{Double, Number, Precision, components, components_mut, difference, dot, norm};
 use crate::geometry::Arrangement;
 use crate::lane::Lane;
 use crate::physics::failure::CriticalStretch;
@@ -26,13 +26,13 @@ pub struct Elasticity<L> {
 
 /// Everything that changes in a run of an elastic body.
 #[derive(Debug, Clone)]
-pub struct State {
+pub struct State<P: Precision = Double> {
     /// Displacement, m; component after component over all slots.
-    pub displacement: Vec<f64>,
+    pub displacement: Vec<P::Field>,
     /// m/s
-    pub velocity: Vec<f64>,
+    pub velocity: Vec<P::Field>,
     /// Force density: internal, and after the loads are added total; N/m³.
-    pub force: Vec<f64>,
+    pub force: Vec<P::Field>,
     /// μ: one bit a directed bond.
     pub states: BondStates,
     /// Broken since the start, pre-cracks not counted.
@@ -41,12 +41,12 @@ pub struct State {
 
 impl<L> Elasticity<L> {
     /// At rest, all bonds whole.
-    pub fn initial_state<const D: usize>(&self, body: &Body<D>) -> State {
-        let n = D * body.cloud.n_slots();
+    pub fn initial_state<const D: usize, P: Precision>(&self, body: &Body<D>) -> State<P> {
+        let zeros = || vec![P::Field::default(); D * body.cloud.n_slots()];
         State {
-            displacement: vec![0.0; n],
-            velocity: vec![0.0; n],
-            force: vec![0.0; n],
+            displacement: zeros(),
+            velocity: zeros(),
+            force: zeros(),
             states: BondStates::whole(body),
             broken: Broken::default(),
         }
@@ -56,37 +56,39 @@ impl<L> Elasticity<L> {
     ///
     /// `dt`: the step that led to these displacements with the velocities as they are now, for the books of the
     /// energy that broken bonds take; zero at the start.
-    pub fn evaluate<const D: usize>(&self, body: &Body<D>, exec: &mut Exec, state: &mut State, dt: f64)
+    pub fn evaluate<const D: usize, P: Packs>(&self, body: &Body<D>, exec: &mut Exec, state: &mut State<P>, dt: f64)
     where
         L: BondLaw<D>,
     {
         let kernel = Force(self.law);
-        let (input, output) = (components::<D>(&state.displacement), components_mut::<D>(&mut state.force));
-        let rule = Breaking::<D, L> {
+        let (input, output) = (components::<D, _>(&state.displacement), components_mut::<D, _>(&mut state.force));
+        let rule = Breaking::<D, L, P::Field> {
             failure: self.failure.as_ref(),
             law: self.law,
             displacement: input,
-            velocity: components::<D>(&state.velocity),
+            velocity: components::<D, _>(&state.velocity),
             dt,
         };
         let weights = &self.operator.weights;
-        let now = exec.sum_bonds_and_break(body, weights, &mut state.states, input, output, &kernel, &rule);
+        let now =
+            exec.sum_bonds_and_break::<D, D, D, P>(body, weights, &mut state.states, input, output, &kernel, &rule);
         state.broken.bonds += now.bonds;
         state.broken.energy += now.energy;
     }
 
     /// Strain energy density at each slot, W = ½ Σ w β V′ (J/m³); eq. (9).
-    pub fn strain_energy_density<const D: usize>(
+    pub fn strain_energy_density<const D: usize, P: Packs>(
         &self,
         body: &Body<D>,
         exec: &mut Exec,
-        state: &State,
-        density: &mut [f64],
+        state: &State<P>,
+        density: &mut [P::Field],
     ) where
         L: BondLaw<D>,
     {
-        let input = components::<D>(&state.displacement);
-        exec.sum_bonds(body, &self.operator.weights, &state.states, input, [density], &Energy(self.law));
+        let input = components::<D, _>(&state.displacement);
+        let (weights, kernel) = (&self.operator.weights, Energy(self.law));
+        exec.sum_bonds::<D, D, 1, P>(body, weights, &state.states, input, [density], &kernel);
     }
 
     /// Σ β V′ over the bonds that `states` holds, at each slot.
@@ -97,7 +99,7 @@ impl<L> Elasticity<L> {
         states: &BondStates,
         volume: &mut [f64],
     ) {
-        exec.sum_bonds::<D, 0, 1>(body, &self.operator.volumes, states, [], [volume], &Weight);
+        exec.sum_bonds::<D, 0, 1, Double>(body, &self.operator.volumes, states, [], [volume], &Weight);
     }
 
     /// Largest stable step of velocity Verlet, s: Δt = √(2ρ / max Σ k β V′), k the spring constant of a bond.
@@ -133,24 +135,23 @@ impl<L> Elasticity<L> {
     }
 }
 
-/// η = u′ − u
-#[inline(always)]
-fn relative<const D: usize, L: Lane>(here: [L; D], mut there: [L; D]) -> [L; D] {
-    for d in 0..D {
-        there[d] = there[d] - here[d];
-    }
-    there
-}
-
 /// Σ f
 struct Force<L>(L);
 
 impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, D> for Force<B> {
-    const HOT: bool = true;
+    const SMALL: f64 = B::SMALL;
 
     #[inline(always)]
-    fn evaluate<L: Lane>(&self, bond: &Bond<D, L>, here: [L; D], there: [L; D]) -> ([L; D], L) {
-        self.0.force(bond, relative(here, there))
+    fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
+        self.0.strain(bond, eta)
+    }
+    #[inline(always)]
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
+        self.0.force(bond, eta, strain, sum)
+    }
+    #[inline(always)]
+    fn add_small<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
+        self.0.small_force(bond, eta, strain, sum)
     }
 }
 
@@ -158,10 +159,19 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, D> for Force<B> {
 struct Energy<L>(L);
 
 impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, 1> for Energy<B> {
+    const SMALL: f64 = B::SMALL;
+
     #[inline(always)]
-    fn evaluate<L: Lane>(&self, bond: &Bond<D, L>, here: [L; D], there: [L; D]) -> ([L; 1], L) {
-        let energy = self.0.energy(bond, relative(here, there));
-        ([L::splat(0.5) * energy], L::splat(0.0))
+    fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
+        self.0.strain(bond, eta)
+    }
+    #[inline(always)]
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; D], strain: L, [sum]: [L; 1]) -> [L; 1] {
+        [L::splat(0.5).mul_add(self.0.energy(bond, strain), sum)]
+    }
+    #[inline(always)]
+    fn add_small<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; D], strain: L, [sum]: [L; 1]) -> [L; 1] {
+        [L::splat(0.5).mul_add(self.0.small_energy(bond, strain), sum)]
     }
 }
 
@@ -169,38 +179,45 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, 1> for Energy<B> {
 struct Weight;
 
 impl<const D: usize> BondKernel<D, 0, 1> for Weight {
+    const RELATIVE: bool = false;
+
     #[inline(always)]
-    fn evaluate<L: Lane>(&self, bond: &Bond<D, L>, _: [L; 0], _: [L; 0]) -> ([L; 1], L) {
-        ([bond.weight], L::splat(0.0))
+    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
+        L::splat(0.0)
+    }
+    #[inline(always)]
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
+        [sum + bond.weight]
     }
 }
 
 /// The critical stretch, if bonds can break, and what is needed to know the energy that a broken bond takes.
-struct Breaking<'a, const D: usize, L: BondLaw<D>> {
+struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
     failure: Option<&'a CriticalStretch>,
     law: L,
-    displacement: [&'a [f64]; D],
-    velocity: [&'a [f64]; D],
+    displacement: [&'a [F]; D],
+    velocity: [&'a [F]; D],
     dt: f64,
 }
 
-impl<const D: usize, L: BondLaw<D>> BreakRule<D> for Breaking<'_, D, L> {
+impl<const D: usize, L: BondLaw<D>, F: Number> BreakRule<D> for Breaking<'_, D, L, F> {
     fn threshold(&self) -> f64 {
-        self.failure.map_or(f64::INFINITY, CriticalStretch::smallest)
+        self.failure.map_or(f64::INFINITY, |failure| self.law.strain_at(failure.smallest()))
     }
 
-    fn breaks(&self, here: usize, there: usize, stretch: f64) -> bool {
-        self.failure.is_some_and(|failure| stretch > failure.of(here, there))
+    fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
+        self.failure.is_some_and(|failure| strain > self.law.strain_at(failure.of(here, there)))
     }
 
     /// Half of w(η) + ½ f(η)·Δη, with η at the start of the step in which the bond breaks and Δη its change in the
     /// step: what the bond held, and what it still took from the motion, since velocity Verlet kicks with its force at
     /// the start of the step and no longer with that at the end. So the books balance whatever the step.
     fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
-        let change: [f64; D] = std::array::from_fn(|d| self.dt * (self.velocity[d][there] - self.velocity[d][here]));
-        let before: [f64; D] =
-            std::array::from_fn(|d| self.displacement[d][there] - self.displacement[d][here] - change[d]);
-        let (force, _) = self.law.force(bond, before);
-        0.5 * (self.law.energy(bond, before) + 0.5 * dot(&force, &change))
+        let difference = |f: &[&[F]; D], d: usize| f[d][there].to_f64() - f[d][here].to_f64();
+        let change: [f64; D] = std::array::from_fn(|d| self.dt * difference(&self.velocity, d));
+        let before: [f64; D] = std::array::from_fn(|d| difference(&self.displacement, d) - change[d]);
+        let strain = self.law.strain(bond, &before);
+        let force = self.law.force(bond, &before, strain, [0.0; D]);
+        0.5 * (self.law.energy(bond, strain) + 0.5 * dot(&force, &change))
     }
 }
