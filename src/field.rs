@@ -5,11 +5,16 @@
 //! fields by name. Names exist for output only.
 
 use std::fmt::Debug;
+use std::ops::{Add, Mul};
 
 /// A number that a field is stored in, or that the arithmetic along a bond is done in: `f64` or `f32`.
-pub trait Number: Copy + Default + PartialOrd + Debug + Send + Sync + 'static {
+pub trait Number:
+    Copy + Default + PartialOrd + Debug + Send + Sync + Add<Output = Self> + Mul<Output = Self> + 'static
+{
     fn from_f64(x: f64) -> Self;
     fn to_f64(self) -> f64;
+    /// Its bytes, the lowest first.
+    fn bytes(self) -> impl AsRef<[u8]>;
 }
 
 impl Number for f64 {
@@ -21,6 +26,9 @@ impl Number for f64 {
     fn to_f64(self) -> f64 {
         self
     }
+    fn bytes(self) -> impl AsRef<[u8]> {
+        self.to_le_bytes()
+    }
 }
 
 impl Number for f32 {
@@ -31,6 +39,9 @@ impl Number for f32 {
     #[inline(always)]
     fn to_f64(self) -> f64 {
         f64::from(self)
+    }
+    fn bytes(self) -> impl AsRef<[u8]> {
+        self.to_le_bytes()
     }
 }
 

@@ -6,17 +6,18 @@
 use crate::conditions::prescribed::Step;
 use crate::conditions::{Load, Prescribed};
 use crate::error::{Error, NumericalStop, Result};
-use crate::execution::Exec;
+use crate::execution::{Exec, Packs};
 use crate::family::{Body, BondLaw, BondStates};
-use crate::field::{Field, Values, components, components_mut, embed};
+use crate::field::{Double, Field, Number, Precision, Values, components, components_mut, embed};
+use crate::geometry::Arrangement;
 use crate::physics::elasticity::{Elasticity, State};
 use crate::solver::{Clock, Stage, System, Unknowns, VelocityVerlet};
 
 /// One body, what it is made of, what acts on it, and where it stands.
-pub struct Problem<const D: usize, L> {
+pub struct Problem<const D: usize, L, P: Precision = Double> {
     pub body: Body<D>,
     pub physics: Elasticity<L>,
-    pub state: State,
+    pub state: State<P>,
     pub prescribed: Vec<Prescribed>,
     pub loads: Vec<Load>,
     /// Σ β V′ over the family before any bond broke, by slot: what damage is measured against.
@@ -77,12 +78,12 @@ impl Balance {
     }
 }
 
-impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
+impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
     /// `state` holds initial values and broken pre-cracks; `n_cut` directed bonds of these.
     pub fn new(
         body: Body<D>,
         physics: Elasticity<L>,
-        state: State,
+        state: State<P>,
         prescribed: Vec<Prescribed>,
         loads: Vec<Load>,
         n_cut: u64,
@@ -112,7 +113,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
             let c = p.component;
             let force = components::<D, _>(&self.state.force)[c];
             for (&slot, last) in p.slots.iter().zip(&mut p.last) {
-                last[2] = force[slot as usize];
+                last[2] = force[slot as usize].to_f64();
             }
         }
         let now = self.balance();
@@ -141,22 +142,25 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
 
     /// Kinetic energy and momentum.
     fn motion(&mut self) -> (f64, [f64; 3]) {
-        let (cloud, velocity) = (&self.body.cloud, components::<D, _>(&self.state.velocity));
-        let density = self.physics.density;
-        let [square, px, py, pz] = self.exec.sum(cloud.n_points(), |points| {
+        let (cloud, density) = (&self.body.cloud, self.physics.density);
+        let velocity = components::<D, _>(&self.state.velocity);
+        let (volumes, volume) = match &cloud.arrangement {
+            // Slots without a point are at rest.
+            Arrangement::Lattice(lattice) => (None, lattice.cell_volume()),
+            Arrangement::Scattered { volumes, .. } => (Some(volumes), 1.0),
+        };
+        let [square, momentum @ ..] = self.exec.sum(cloud.n_slots(), |slots| {
+            let volumes = volumes.map(|v| &v[slots.clone()]);
             let mut sum = [0.0; 4];
-            for &slot in &cloud.slots[points] {
-                let slot = slot as usize;
-                let mass = density * cloud.volume(slot);
-                for d in 0..D {
-                    let v = velocity[d][slot];
-                    sum[0] += mass * v * v;
-                    sum[d + 1] += mass * v;
-                }
+            for d in 0..D {
+                let [square, momentum] = squares_and_sum(&velocity[d][slots.clone()], volumes);
+                sum[0] += square;
+                sum[d + 1] = momentum;
             }
             sum
         });
-        (0.5 * square, [px, py, pz])
+        let mass = density * volume;
+        (0.5 * mass * square, momentum.map(|p| mass * p))
     }
 
     /// Stops on values that are not finite, and on kinetic energy that nothing can have put in.
@@ -195,9 +199,9 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
                 ("velocity", &self.state.velocity),
             ] {
                 for component in components::<D, _>(flat) {
-                    let bad = self.body.cloud.slots.iter().position(|&s| !component[s as usize].is_finite());
+                    let bad = self.body.cloud.slots.iter().position(|&s| !component[s as usize].to_f64().is_finite());
                     if let Some(point) = bad {
-                        let value = component[self.body.cloud.slots[point] as usize];
+                        let value = component[self.body.cloud.slots[point] as usize].to_f64();
                         return Err(stop(field, value, Some(point)));
                     }
                 }
@@ -208,7 +212,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
         let available = self.ledger.initial + self.ledger.external.abs() + self.state.broken.energy;
         if kinetic > 10.0 * available && clock.step > 2 {
             let velocity = components::<D, _>(&self.state.velocity);
-            let speed = |&slot: &u32| velocity.iter().map(|v| v[slot as usize].powi(2)).sum::<f64>();
+            let speed = |&slot: &u32| velocity.iter().map(|v| v[slot as usize].to_f64().powi(2)).sum::<f64>();
             let worst = (0..self.body.cloud.n_points())
                 .max_by(|&a, &b| speed(&self.body.cloud.slots[a]).total_cmp(&speed(&self.body.cloud.slots[b])));
             return Err(stop("kinetic energy (J, runaway)", kinetic, worst));
@@ -218,7 +222,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
 
     /// The energies and momenta now.
     pub fn balance(&mut self) -> Balance {
-        let mut density = vec![0.0; self.body.cloud.n_slots()];
+        let mut density = vec![P::Field::default(); self.body.cloud.n_slots()];
         self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
         let (cloud, rho) = (&self.body.cloud, self.physics.density);
         let v = components::<D, _>(&self.state.velocity);
@@ -228,8 +232,8 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
             for &slot in &cloud.slots[points] {
                 let slot = slot as usize;
                 let volume = cloud.volume(slot);
-                strain += density[slot] * volume;
-                scale += rho * volume * v.iter().map(|v| v[slot] * v[slot]).sum::<f64>().sqrt();
+                strain += density[slot].to_f64() * volume;
+                scale += rho * volume * v.iter().map(|v| v[slot].to_f64().powi(2)).sum::<f64>().sqrt();
             }
             [strain, scale, 0.0, 0.0]
         });
@@ -238,14 +242,14 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
         let v = components::<D, _>(&self.state.velocity);
         let momentum_of = |slot: usize| -> [f64; 3] {
             let mass = rho * cloud.volume(slot);
-            embed::<D>(&std::array::from_fn(|d| mass * v[d][slot]))
+            embed::<D>(&std::array::from_fn(|d| mass * v[d][slot].to_f64()))
         };
         let angular = self.exec.sum(n, |points| {
             let mut sum = [0.0; 4];
             for &slot in &cloud.slots[points] {
                 let slot = slot as usize;
                 let x = cloud.position(slot);
-                let y = embed::<D>(&std::array::from_fn(|d| x[d] + u[d][slot]));
+                let y = embed::<D>(&std::array::from_fn(|d| x[d] + u[d][slot].to_f64()));
                 let p = momentum_of(slot);
                 for d in 0..3 {
                     let (a, b) = ((d + 1) % 3, (d + 2) % 3);
@@ -288,9 +292,11 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
     /// A field by name, in point order; None if there is no such field.
     pub fn field(&mut self, name: &str) -> Option<Field> {
         let slots = &self.body.cloud.slots;
-        let vector = |flat: &[f64]| {
+        let vector = |flat: &[P::Field]| {
             let parts = components::<D, _>(flat);
-            Values::Vector(slots.iter().map(|&s| embed::<D>(&std::array::from_fn(|d| parts[d][s as usize]))).collect())
+            Values::Vector(
+                slots.iter().map(|&s| embed::<D>(&std::array::from_fn(|d| parts[d][s as usize].to_f64()))).collect(),
+            )
         };
         let (name, unit, values) = match name {
             "displacement" => ("displacement", "m", vector(&self.state.displacement)),
@@ -298,10 +304,10 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
             "force" => ("force", "N/m³", vector(&self.state.force)),
             "damage" => ("damage", "", Values::Scalar(self.damage())),
             "strain_energy" => {
-                let mut density = vec![0.0; self.body.cloud.n_slots()];
+                let mut density = vec![P::Field::default(); self.body.cloud.n_slots()];
                 self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
                 let slots = &self.body.cloud.slots;
-                ("strain_energy", "J/m³", Values::Scalar(slots.iter().map(|&s| density[s as usize]).collect()))
+                ("strain_energy", "J/m³", Values::Scalar(slots.iter().map(|&s| density[s as usize].to_f64()).collect()))
             }
             _ => return None,
         };
@@ -314,7 +320,7 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
         for flat in [&self.state.displacement, &self.state.velocity] {
             for component in components::<D, _>(flat) {
                 for &slot in &self.body.cloud.slots {
-                    hasher.update(&component[slot as usize].to_le_bytes());
+                    hasher.update(component[slot as usize].bytes().as_ref());
                 }
             }
         }
@@ -328,11 +334,42 @@ impl<const D: usize, L: BondLaw<D>> Problem<D, L> {
     }
 }
 
+/// Σ v² V and Σ v V; V = 1 where none is given. Eight sums side by side, so that the loop is vectors.
+fn squares_and_sum<T: Number>(values: &[T], volumes: Option<&[f64]>) -> [f64; 2] {
+    let (mut squares, mut sums) = ([0.0; 8], [0.0; 8]);
+    let mut chunks = values.chunks_exact(8);
+    match volumes {
+        None => {
+            for chunk in &mut chunks {
+                for k in 0..8 {
+                    let v = chunk[k].to_f64();
+                    squares[k] += v * v;
+                    sums[k] += v;
+                }
+            }
+            for (k, v) in chunks.remainder().iter().enumerate() {
+                squares[k] += v.to_f64() * v.to_f64();
+                sums[k] += v.to_f64();
+            }
+        }
+        Some(volumes) => {
+            for (k, (v, volume)) in values.iter().zip(volumes).enumerate() {
+                let v = v.to_f64();
+                squares[k % 8] += v * v * volume;
+                sums[k % 8] += v * volume;
+            }
+        }
+    }
+    [squares, sums].map(|[a, b, c, d, e, f, g, h]| ((a + e) + (c + g)) + ((b + f) + (d + h)))
+}
+
 /// The fields that [`Problem::field`] knows.
 pub const FIELDS: [&str; 5] = ["displacement", "velocity", "force", "damage", "strain_energy"];
 
-impl<const D: usize, L: BondLaw<D>> System for Problem<D, L> {
-    fn unknowns(&mut self) -> Unknowns<'_> {
+impl<const D: usize, L: BondLaw<D>, P: Packs> System for Problem<D, L, P> {
+    type Number = P::Field;
+
+    fn unknowns(&mut self) -> Unknowns<'_, P::Field> {
         Unknowns {
             displacement: &mut self.state.displacement,
             velocity: &mut self.state.velocity,
@@ -345,7 +382,7 @@ impl<const D: usize, L: BondLaw<D>> System for Problem<D, L> {
         let State { displacement, velocity, force, .. } = &mut self.state;
         for p in &mut self.prescribed {
             let c = p.component;
-            let u = components::<D, _>(displacement)[c];
+            let u = &mut *components_mut::<D, _>(displacement)[c];
             let v = &mut *components_mut::<D, _>(velocity)[c];
             match stage {
                 Stage::Drift => p.drift(t, dt, u, v),

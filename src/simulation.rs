@@ -5,8 +5,9 @@ use std::time::Instant;
 
 use crate::conditions::prescribed::Prescribed;
 use crate::error::{Error, Result};
+use crate::execution::Packs;
 use crate::family::{BondLaw, BondStates};
-use crate::field::{Field, embed};
+use crate::field::{Double, Field, Precision, embed};
 use crate::geometry::Arrangement;
 use crate::output::history::History;
 use crate::output::report::{Energy, Report, Tip, WallSeconds, peak_memory};
@@ -191,16 +192,16 @@ pub fn prepare_folder(folder: &Path, overwrite: bool) -> Result<()> {
 }
 
 /// A problem together with what its writers ask for again and again.
-pub struct Model<const D: usize, L> {
-    pub problem: Problem<D, L>,
+pub struct Model<const D: usize, L, P: Precision = Double> {
+    pub problem: Problem<D, L, P>,
     facts: Facts,
     positions: Vec<[f64; 3]>,
     sizes: Vec<f64>,
 }
 
-impl<const D: usize, L: BondLaw<D>> Model<D, L> {
+impl<const D: usize, L: BondLaw<D>, P: Packs> Model<D, L, P> {
     /// `facts` as far as the case knows them; counts and sizes are filled in from the problem.
-    pub fn new(problem: Problem<D, L>, facts: Facts) -> Self {
+    pub fn new(problem: Problem<D, L, P>, facts: Facts) -> Self {
         let cloud = &problem.body.cloud;
         let positions: Vec<[f64; 3]> = cloud.slots.iter().map(|&s| embed(&cloud.position(s as usize))).collect();
         let sizes = match &cloud.arrangement {
@@ -227,7 +228,7 @@ impl<const D: usize, L: BondLaw<D>> Model<D, L> {
     }
 }
 
-impl<const D: usize, L: BondLaw<D>> Source for Model<D, L> {
+impl<const D: usize, L: BondLaw<D>, P: Packs> Source for Model<D, L, P> {
     fn positions(&self) -> &[[f64; 3]] {
         &self.positions
     }
@@ -257,7 +258,7 @@ impl<const D: usize, L: BondLaw<D>> Source for Model<D, L> {
     }
 }
 
-impl<const D: usize, L: BondLaw<D>> Stepper for Model<D, L> {
+impl<const D: usize, L: BondLaw<D>, P: Packs> Stepper for Model<D, L, P> {
     fn start(&mut self) {
         self.problem.start();
     }

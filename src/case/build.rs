@@ -14,7 +14,7 @@ use super::diagnostics::{Diagnostic, Severity};
 use super::import;
 use super::model::{
     self, Axis, BondBased, Case, FieldName, Formula, InfluenceFunction, Law, Motion, Output, PartialVolumes, Plane,
-    Region, Solver,
+    Precision, Region, Solver,
 };
 use super::read::{Located, Source};
 use crate::conditions::load::Scale;
@@ -22,9 +22,10 @@ use crate::conditions::profile::VARIABLES;
 use crate::conditions::{Load, Prescribed, Profile, Quantity, initial};
 use crate::discretization::{Influence, Operator, PartialVolume, standard};
 use crate::error::{Error, Result};
+use crate::execution::Packs;
 use crate::expression::{Expression, nearest};
 use crate::family::BondLaw;
-use crate::field::{Vector, components_mut};
+use crate::field::{Double, Mixed, Single, Vector, components_mut};
 use crate::geometry::{Arrangement, Cloud, Crack, Shape};
 use crate::output::crack_tip::CrackTip;
 use crate::output::frames::Frames;
@@ -102,6 +103,14 @@ impl<const D: usize> Builder<'_, D> {
         }
     }
 
+    fn with_law<L: BondLaw<D> + 'static>(&self, law: L, parameters: &BondBased) -> Result<Simulation> {
+        match self.case.value.discretization.precision {
+            Precision::Double => self.in_precision::<L, Double>(law, parameters),
+            Precision::Single => self.in_precision::<L, Single>(law, parameters),
+            Precision::Mixed => self.in_precision::<L, Mixed>(law, parameters),
+        }
+    }
+
     fn source(&self) -> &Source {
         &self.case.source
     }
@@ -111,7 +120,11 @@ impl<const D: usize> Builder<'_, D> {
         refuse(self.case, vec![if help.is_empty() { diagnostic } else { diagnostic.help(help) }])
     }
 
-    fn with_law<L: BondLaw<D> + 'static>(&self, law: L, parameters: &BondBased) -> Result<Simulation> {
+    fn in_precision<L, P>(&self, law: L, parameters: &BondBased) -> Result<Simulation>
+    where
+        L: BondLaw<D> + 'static,
+        P: Packs,
+    {
         let case = &self.case.value;
         let shape = self.shape()?;
         let cracks = self.cracks()?;
@@ -136,7 +149,7 @@ impl<const D: usize> Builder<'_, D> {
         let body = standard::body(cloud, horizon, rule);
         let operator = Operator::standard(&body, strength, influence, rule);
         let physics = Elasticity { law, density: parameters.density, operator, failure };
-        let mut state = physics.initial_state(&body);
+        let mut state = physics.initial_state::<D, P>(&body);
         let mut n_cut = 0;
         for crack in &cracks {
             n_cut += state.states.cut(&body, crack, tolerance);

@@ -278,6 +278,9 @@ pub struct Discretization {
     pub partial_volumes: PartialVolumes,
     #[serde(default)]
     pub scheme: Scheme,
+    /// What fields are stored in and bonds are computed in.
+    #[serde(default)]
+    pub precision: Precision,
 }
 
 /// Influence functions, t = |ξ|/δ.
@@ -317,6 +320,19 @@ pub enum PartialVolumes {
     Ramp,
     /// The exact part of the cell inside the horizon.
     Exact,
+}
+
+/// Precisions of fields and bonds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 64 bits for both.
+    #[default]
+    Double,
+    /// 32 bits for both: half the memory.
+    Single,
+    /// Fields of 64 bits; displacements are subtracted in 64 bits, the rest of a bond is 32 bits.
+    Mixed,
 }
 
 /// Schemes of discretisation.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::Profile;
+use crate::field::Number;
 
 /// A force density on one component at the points of a set, b(x, t) in N/m³.
 ///
@@ -46,12 +47,12 @@ pub struct Done {
 impl Load {
     /// Adds b(x, t) to one component of the force density, and returns the work and impulse since the last call, by
     /// the trapezoidal rule in time, which is what velocity Verlet does to momentum and, to second order, to energy.
-    pub fn apply(
+    pub fn apply<T: Number>(
         &mut self,
         t: f64,
         dt: f64,
-        displacement: &[f64],
-        force: &mut [f64],
+        displacement: &[T],
+        force: &mut [T],
         volume: impl Fn(usize) -> f64,
     ) -> Done {
         let active = t <= self.until;
@@ -69,13 +70,13 @@ impl Load {
                 Scale::ByPoint(s) => s[k],
             };
             let b = if active { scale * values[k] } else { 0.0 };
-            let u = displacement[slot];
+            let u = displacement[slot].to_f64();
             if !first {
                 let mean = 0.5 * (last.force[k] + b) * volume(slot);
                 done.work += mean * (u - last.displacement[k]);
                 done.impulse += mean * dt;
             }
-            force[slot] += b;
+            force[slot] = T::from_f64(force[slot].to_f64() + b);
             last.force[k] = b;
             last.displacement[k] = u;
         }

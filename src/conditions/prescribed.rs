@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::Profile;
 use super::load::Done;
+use crate::field::Number;
 
 /// What is prescribed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,38 +40,40 @@ pub struct Prescribed {
     pub until: f64,
     /// Force that the constraint exerts on the body, mean over the last step, N.
     pub reaction: f64,
+    /// u (m), v (m/s) and force density (N/m³) of each point at the end of the last step.
     pub last: Vec<[f64; 3]>,
 }
 
 impl Prescribed {
-    /// Sets the velocities with which the set drifts over the step from `t` to `t + dt`.
-    pub fn drift(&mut self, t: f64, dt: f64, displacement: &[f64], velocity: &mut [f64]) {
+    /// Sets the velocities with which the set drifts over the step from `t` to `t + dt`, and where they lead from the
+    /// displacements at its start.
+    pub fn drift<T: Number>(&mut self, t: f64, dt: f64, displacement: &mut [T], velocity: &mut [T]) {
         if t + dt > self.until {
             return;
         }
-        match self.quantity {
-            Quantity::Velocity => {
-                for (&slot, v) in self.slots.iter().zip(self.profile.at(t + 0.5 * dt)) {
-                    velocity[slot as usize] = *v;
-                }
-            }
-            Quantity::Displacement => {
-                for (&slot, u) in self.slots.iter().zip(self.profile.at(t + dt)) {
-                    velocity[slot as usize] = (u - displacement[slot as usize]) / dt;
-                }
-            }
+        let at = match self.quantity {
+            Quantity::Velocity => t + 0.5 * dt,
+            Quantity::Displacement => t + dt,
+        };
+        for ((&slot, &value), [before, ..]) in self.slots.iter().zip(self.profile.at(at)).zip(&self.last) {
+            let v = match self.quantity {
+                Quantity::Velocity => value,
+                Quantity::Displacement => (value - before) / dt,
+            };
+            velocity[slot as usize] = T::from_f64(v);
+            displacement[slot as usize] = T::from_f64(before + dt * v);
         }
     }
 
     /// Sets the velocities at the end of the step and accounts for the reaction over the step: its impulse is the change
     /// of momentum less the impulse of all other forces, its work the change of kinetic energy less theirs. Damping, an
     /// inner force −ρ c v, counts among the others by the trapezoidal rule, as velocity Verlet applies it.
-    pub fn finish(
+    pub fn finish<T: Number>(
         &mut self,
         step: &Step,
-        displacement: &[f64],
-        velocity: &mut [f64],
-        force: &[f64],
+        displacement: &[T],
+        velocity: &mut [T],
+        force: &[T],
         volume: impl Fn(usize) -> f64,
     ) -> Done {
         let Step { t, dt, inertia, damping } = *step;
@@ -82,20 +85,20 @@ impl Prescribed {
         match self.quantity {
             Quantity::Velocity => {
                 for (&slot, v) in self.slots.iter().zip(self.profile.at(t)) {
-                    velocity[slot as usize] = *v;
+                    velocity[slot as usize] = T::from_f64(*v);
                 }
             }
             Quantity::Displacement => {
                 // The slope of the formula at t, by a central difference over the step.
                 let after = self.profile.at(t + 0.5 * dt).to_vec();
                 for ((&slot, before), after) in self.slots.iter().zip(self.profile.at(t - 0.5 * dt)).zip(&after) {
-                    velocity[slot as usize] = (after - before) / dt;
+                    velocity[slot as usize] = T::from_f64((after - before) / dt);
                 }
             }
         }
         for (&slot, last) in self.slots.iter().zip(&mut self.last) {
             let slot = slot as usize;
-            let (u, v, f) = (displacement[slot], velocity[slot], force[slot]);
+            let [u, v, f] = [displacement[slot], velocity[slot], force[slot]].map(T::to_f64);
             let [u_last, v_last, f_last] = *last;
             let mean = 0.5 * (f + f_last);
             let damped = 0.5 * inertia * damping * dt;
@@ -109,16 +112,16 @@ impl Prescribed {
     }
 
     /// Puts the set on its prescribed motion at the start of a run.
-    pub fn start(&mut self, t: f64, displacement: &mut [f64], velocity: &mut [f64], force: &[f64]) {
+    pub fn start<T: Number>(&mut self, t: f64, displacement: &mut [T], velocity: &mut [T], force: &[T]) {
         let values = self.profile.at(t);
         self.last.clear();
         for (&slot, value) in self.slots.iter().zip(values) {
             let slot = slot as usize;
             match self.quantity {
-                Quantity::Displacement => displacement[slot] = *value,
-                Quantity::Velocity => velocity[slot] = *value,
+                Quantity::Displacement => displacement[slot] = T::from_f64(*value),
+                Quantity::Velocity => velocity[slot] = T::from_f64(*value),
             }
-            self.last.push([displacement[slot], velocity[slot], force[slot]]);
+            self.last.push([displacement[slot], velocity[slot], force[slot]].map(T::to_f64));
         }
     }
 }

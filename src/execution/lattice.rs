@@ -112,11 +112,7 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
     /// Mirror images of an offset stand in sequences of their own, which are added as a balanced tree: a mirrored body
     /// has mirrored bits.
     #[inline(always)]
-    unsafe fn sum_on<V: Pack<P::Bond> + Ends<P::Field>, const SMALL: bool>(
-        &self,
-        words: &[u16],
-        slot: usize,
-    ) -> f64 {
+    unsafe fn sum_on<V: Pack<P::Bond> + Ends<P::Field>, const SMALL: bool>(&self, words: &[u16], slot: usize) -> f64 {
         let mut watch = V::splat(0.0);
         for part in 0..BLOCK / V::LANES {
             let first = slot + part * V::LANES;

@@ -4,12 +4,14 @@ pub mod velocity_verlet;
 
 pub use velocity_verlet::VelocityVerlet;
 
+use crate::field::Number;
+
 /// The vectors that a solver of second order advances: ρ ü = force − ρ c u̇.
-pub struct Unknowns<'a> {
-    pub displacement: &'a mut [f64],
-    pub velocity: &'a mut [f64],
+pub struct Unknowns<'a, T> {
+    pub displacement: &'a mut [T],
+    pub velocity: &'a mut [T],
     /// Force density at the current displacements.
-    pub force: &'a [f64],
+    pub force: &'a [T],
     /// ρ
     pub inertia: f64,
 }
@@ -32,7 +34,7 @@ impl Clock {
 /// When constraints are asked to act within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Before the drift: set the velocities of the step.
+    /// After the drift: set the velocities of the step, and the displacements to which they lead.
     Drift,
     /// After the last kick: set the velocities at the end of the step.
     Finish,
@@ -40,7 +42,9 @@ pub enum Stage {
 
 /// What a solver advances.
 pub trait System {
-    fn unknowns(&mut self) -> Unknowns<'_>;
+    /// What the vectors are stored in.
+    type Number: Number;
+    fn unknowns(&mut self) -> Unknowns<'_, Self::Number>;
     /// Imposes prescribed values; `t` is the time at the start of the step for `Drift`, at its end for `Finish`.
     fn constrain(&mut self, stage: Stage, t: f64, dt: f64);
     /// Breaks what breaks at the current displacements and fills the force density at time `t`, `dt` after the last.

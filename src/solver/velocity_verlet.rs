@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use super::{Clock, Stage, System, Unknowns};
+use crate::field::Number;
 
 /// Numbers that a thread updates at a time.
 const CHUNK: usize = 16 * 1024;
@@ -19,30 +20,37 @@ pub struct VelocityVerlet {
 
 impl VelocityVerlet {
     /// Advances `system` by one step.
-    pub fn step(&self, system: &mut dyn System, clock: &mut Clock) {
+    pub fn step<S: System>(&self, system: &mut S, clock: &mut Clock) {
         let (t, dt) = (clock.time(), clock.dt);
         let half = 0.5 * self.damping * dt;
-        kick(&mut system.unknowns(), dt, 1.0 - half, 1.0);
+        kick_and_drift(&mut system.unknowns(), dt, 1.0 - half);
         system.constrain(Stage::Drift, t, dt);
-        let Unknowns { displacement, velocity, .. } = system.unknowns();
-        displacement.par_chunks_mut(CHUNK).zip(velocity.par_chunks(CHUNK)).for_each(|(u, v)| {
-            for (u, v) in u.iter_mut().zip(v) {
-                *u += dt * v;
-            }
-        });
         clock.step += 1;
         system.evaluate(clock.time(), dt);
-        kick(&mut system.unknowns(), dt, 1.0, 1.0 / (1.0 + half));
+        kick(&mut system.unknowns(), dt, 1.0 / (1.0 + half));
         system.constrain(Stage::Finish, clock.time(), dt);
     }
 }
 
-/// v = (keep v + Δt/2 force/ρ) × after
-fn kick(unknowns: &mut Unknowns<'_>, dt: f64, keep: f64, after: f64) {
-    let factor = 0.5 * dt / unknowns.inertia;
+/// v = keep v + Δt/2 force/ρ; u = u + Δt v: in one pass over memory.
+fn kick_and_drift<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, keep: f64) {
+    let [keep, factor, dt] = [keep, 0.5 * dt / unknowns.inertia, dt].map(T::from_f64);
+    let Unknowns { displacement, velocity, force, .. } = unknowns;
+    let vectors = displacement.par_chunks_mut(CHUNK).zip(velocity.par_chunks_mut(CHUNK)).zip(force.par_chunks(CHUNK));
+    vectors.for_each(|((u, v), f)| {
+        for ((u, v), f) in u.iter_mut().zip(v).zip(f) {
+            *v = keep * *v + factor * *f;
+            *u = *u + dt * *v;
+        }
+    });
+}
+
+/// v = (v + Δt/2 force/ρ) × after
+fn kick<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, after: f64) {
+    let [factor, after] = [0.5 * dt / unknowns.inertia, after].map(T::from_f64);
     unknowns.velocity.par_chunks_mut(CHUNK).zip(unknowns.force.par_chunks(CHUNK)).for_each(|(v, f)| {
         for (v, f) in v.iter_mut().zip(f) {
-            *v = (keep * *v + factor * f) * after;
+            *v = (*v + factor * *f) * after;
         }
     });
 }
@@ -55,7 +63,8 @@ mod tests {
     struct Oscillator([f64; 3]);
 
     impl System for Oscillator {
-        fn unknowns(&mut self) -> Unknowns<'_> {
+        type Number = f64;
+        fn unknowns(&mut self) -> Unknowns<'_, f64> {
             let [u, v, f] = &mut self.0;
             Unknowns {
                 displacement: std::slice::from_mut(u),
