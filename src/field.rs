@@ -15,9 +15,12 @@ pub trait Number:
     fn to_f64(self) -> f64;
     /// Its bytes, the lowest first.
     fn bytes(self) -> impl AsRef<[u8]>;
+    /// A fraction of a length that is nothing: far below rounding, far above the smallest numbers, which are slow.
+    const NEGLIGIBLE: f64;
 }
 
 impl Number for f64 {
+    const NEGLIGIBLE: f64 = 1e-150;
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x
@@ -32,6 +35,7 @@ impl Number for f64 {
 }
 
 impl Number for f32 {
+    const NEGLIGIBLE: f64 = 1e-20;
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x as f32

@@ -375,6 +375,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> System for Problem<D, L, P> {
             velocity: &mut self.state.velocity,
             force: &self.state.force,
             inertia: self.physics.density,
+            negligible: P::Bond::NEGLIGIBLE * self.body.cloud.spacing,
         }
     }
 

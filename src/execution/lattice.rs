@@ -20,8 +20,8 @@ const CHUNK: usize = 64;
 /// What the loop reads of a body.
 pub struct View<'a, const D: usize, B> {
     lattice: &'a Lattice<D>,
-    families: &'a LatticeFamilies<D>,
-    weights: &'a [f64],
+    pub families: &'a LatticeFamilies<D>,
+    pub weights: &'a [f64],
     rows: Vec<Row<D, B>>,
 }
 
@@ -58,6 +58,17 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
     pub fn n_chunks(&self) -> usize {
         self.families.blocks.len().div_ceil(CHUNK)
     }
+
+    /// The blocks of a chunk.
+    pub fn blocks(&self, chunk: usize) -> &[u32] {
+        let blocks = &self.families.blocks;
+        &blocks[chunk * CHUNK..((chunk + 1) * CHUNK).min(blocks.len())]
+    }
+
+    /// The first slot of a block.
+    pub fn slot(&self, block: u32) -> usize {
+        self.lattice.guard + block as usize * BLOCK
+    }
 }
 
 /// A sum over the blocks of a lattice.
@@ -74,12 +85,11 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
     /// Sums the blocks of one chunk.
     pub fn run<R: BreakRule<D>>(&self, chunk: usize, rule: &R) -> Broken {
         let StatesPointer(words) = self.states;
-        let families = self.view.families;
-        let n = families.offsets.len();
+        let n = self.view.families.offsets.len();
         let threshold = rule.threshold();
         let mut broken = Broken::default();
-        for &block in &families.blocks[chunk * CHUNK..((chunk + 1) * CHUNK).min(families.blocks.len())] {
-            let slot = self.view.lattice.guard + block as usize * BLOCK;
+        for &block in self.view.blocks(chunk) {
+            let slot = self.view.slot(block);
             // SAFETY: `block` lies between the guards, so each slot plus each shift is inside the fields, whose length
             // `Exec::pass` has checked; the words of a block and its slots belong to this chunk alone.
             unsafe {
@@ -119,9 +129,9 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
             // SAFETY: the slots of a block are inside the input.
             let here = unsafe { self.hold::<V>(first) };
             let mut total = [V::splat(0.0); O];
+            // Partial sums that wait for their mirror image, by the number of sequences in them.
+            let mut waiting = [[V::splat(0.0); O]; 4];
             for class in &self.view.families.classes {
-                // Partial sums that wait for their mirror image, by the number of sequences in them.
-                let mut waiting = [[V::splat(0.0); O]; 4];
                 let mut k = class.first as usize;
                 for sequence in 0..1 << class.axes {
                     let mut sum = [V::splat(0.0); O];
@@ -254,7 +264,7 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
 // A plain loop: the closures of `array::map` and `from_fn` are functions of their own, which the compiler does not
 // always inline into code for wider instructions.
 #[inline(always)]
-fn add<V: Lane, const O: usize>(mut a: [V; O], b: [V; O]) -> [V; O] {
+pub fn add<V: Lane, const O: usize>(mut a: [V; O], b: [V; O]) -> [V; O] {
     for c in 0..O {
         a[c] = a[c] + b[c];
     }

@@ -13,7 +13,7 @@ macro_rules! compiled {
         /// # Safety
         /// As of the method for all packs; `self.instructions` must be on this machine.
         #[inline(never)]
-        unsafe fn $name<$(const $n: $type)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
+        pub unsafe fn $name<$(const $n: $type)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
             // SAFETY: `Instructions` are given out for this machine alone.
             unsafe {
                 match self.instructions {
@@ -45,6 +45,7 @@ macro_rules! compiled {
 mod cloud;
 mod lattice;
 mod packs;
+mod rows;
 
 use std::ops::Range;
 
@@ -123,7 +124,8 @@ impl Exec {
         Exec { instructions, broken: Vec::new(), partial: Vec::new(), double: Vec::new(), single: Vec::new() }
     }
 
-    /// output(x) = Σ kernel(bond, input(x), input(x′)) over the bonds of x that hold.
+    /// output(x) = Σ kernel(bond, input(x), input(x′)) over the bonds of x that hold. Linear kernels are summed as rows
+    /// on lattices, where the bonds of a block all hold.
     ///
     /// Every slot of a present point is written; slots without a point are left alone.
     pub fn sum_bonds<const D: usize, const I: usize, const O: usize, P: Packs>(
@@ -137,7 +139,7 @@ impl Exec {
     ) {
         // SAFETY of the cast: with `Unbreakable` the loops never write to the states.
         let states = StatesPointer::shared(states);
-        self.pass::<D, I, O, P>(body, weights, states, input, output, kernel, &Unbreakable);
+        self.pass::<D, I, O, P, _, _>(body, weights, states, input, output, kernel, &Unbreakable);
     }
 
     /// As [`Exec::sum_bonds`], but bonds that `rule` breaks at these input values are broken first, at both ends.
@@ -152,19 +154,19 @@ impl Exec {
         kernel: &impl BondKernel<D, I, O>,
         rule: &impl BreakRule<D>,
     ) -> Broken {
-        self.pass::<D, I, O, P>(body, weights, StatesPointer::exclusive(states), input, output, kernel, rule)
+        self.pass::<D, I, O, P, _, _>(body, weights, StatesPointer::exclusive(states), input, output, kernel, rule)
     }
 
     #[allow(clippy::too_many_arguments)]
-    fn pass<const D: usize, const I: usize, const O: usize, P: Packs>(
+    fn pass<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, I, O>, R: BreakRule<D>>(
         &mut self,
         body: &Body<D>,
         weights: &BondWeights,
         states: StatesPointer,
         input: [&[P::Field]; I],
         output: [&mut [P::Field]; O],
-        kernel: &impl BondKernel<D, I, O>,
-        rule: &impl BreakRule<D>,
+        kernel: &K,
+        rule: &R,
     ) -> Broken {
         let n = body.cloud.n_slots();
         assert!(input.iter().all(|f| f.len() == n), "input fields have the length of the cloud");
@@ -176,7 +178,12 @@ impl Exec {
                 let view = &lattice::View::new(body, families, weights);
                 let sum = lattice::Sum::<D, I, O, P, _> { instructions, view, states, input, output, kernel };
                 self.broken.resize(view.n_chunks(), Broken::default());
-                self.broken.par_iter_mut().enumerate().for_each(|(chunk, broken)| *broken = sum.run(chunk, rule));
+                if K::LINEAR && R::NEVER {
+                    let sum = rows::Sum::new(&sum);
+                    (0..view.n_chunks()).into_par_iter().for_each(|chunk| sum.run(chunk));
+                } else {
+                    self.broken.par_iter_mut().enumerate().for_each(|(chunk, broken)| *broken = sum.run(chunk, rule));
+                }
             }
             (Families::Cloud(families), BondWeights::Cloud(weights)) => {
                 let records = P::records(&mut self.double, &mut self.single);

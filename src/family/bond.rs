@@ -32,6 +32,8 @@ impl<const D: usize> Bond<D, f64> {
 pub trait BondKernel<const D: usize, const I: usize, const O: usize>: Sync {
     /// |strain| up to which [`BondKernel::add_small`] may stand for [`BondKernel::add`].
     const SMALL: f64 = f64::INFINITY;
+    /// Whether the summand is linear in the relative values and the same along −ξ as along ξ.
+    const LINEAR: bool = false;
     /// Whether the summand is zero where the ends have the same values. Broken bonds are given as such, which saves
     /// a mask; the summands of other kernels are masked.
     const RELATIVE: bool = true;
@@ -54,6 +56,8 @@ pub trait BondKernel<const D: usize, const I: usize, const O: usize>: Sync {
 pub trait BondLaw<const D: usize>: Copy + Send + Sync {
     /// |strain| up to which the small forms serve; infinite where there is one form only.
     const SMALL: f64 = f64::INFINITY;
+    /// Whether the force is linear in η.
+    const LINEAR: bool = false;
 
     /// How far the bond is strained, in the measure of this law: grows with the stretch, without rounding of its own
     /// where η is small. A bond breaks when this passes [`BondLaw::strain_at`] its critical stretch.

@@ -34,13 +34,15 @@ impl VelocityVerlet {
 
 /// v = keep v + Δt/2 force/ρ; u = u + Δt v: in one pass over memory.
 fn kick_and_drift<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, keep: f64) {
-    let [keep, factor, dt] = [keep, 0.5 * dt / unknowns.inertia, dt].map(T::from_f64);
+    let [keep, factor] = [keep, 0.5 * dt / unknowns.inertia].map(T::from_f64);
+    let [still, slow] = [unknowns.negligible, slow(unknowns.negligible, dt)].map(T::from_f64);
+    let dt = T::from_f64(dt);
     let Unknowns { displacement, velocity, force, .. } = unknowns;
     let vectors = displacement.par_chunks_mut(CHUNK).zip(velocity.par_chunks_mut(CHUNK)).zip(force.par_chunks(CHUNK));
     vectors.for_each(|((u, v), f)| {
         for ((u, v), f) in u.iter_mut().zip(v).zip(f) {
-            *v = keep * *v + factor * *f;
-            *u = *u + dt * *v;
+            *v = unless_below(slow, keep * *v + factor * *f);
+            *u = unless_below(still, *u + dt * *v);
         }
     });
 }
@@ -48,11 +50,22 @@ fn kick_and_drift<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, keep: f64)
 /// v = (v + Δt/2 force/ρ) × after
 fn kick<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, after: f64) {
     let [factor, after] = [0.5 * dt / unknowns.inertia, after].map(T::from_f64);
+    let slow = T::from_f64(slow(unknowns.negligible, dt));
     unknowns.velocity.par_chunks_mut(CHUNK).zip(unknowns.force.par_chunks(CHUNK)).for_each(|(v, f)| {
         for (v, f) in v.iter_mut().zip(f) {
-            *v = (*v + factor * *f) * after;
+            *v = unless_below(slow, (*v + factor * *f) * after);
         }
     });
+}
+
+/// The velocity that takes 10⁵ steps over a negligible displacement.
+fn slow(negligible: f64, dt: f64) -> f64 {
+    1e-5 * negligible / dt
+}
+
+#[inline(always)]
+fn unless_below<T: Number>(limit: T, x: T) -> T {
+    if x < limit && limit + x > T::default() { T::default() } else { x }
 }
 
 #[cfg(test)]
@@ -71,6 +84,7 @@ mod tests {
                 velocity: std::slice::from_mut(v),
                 force: std::slice::from_ref(f),
                 inertia: 1.0,
+                negligible: 0.0,
             }
         }
         fn constrain(&mut self, _: Stage, _: f64, _: f64) {}

@@ -149,6 +149,21 @@ macro_rules! ends {
                 if mask & 0xf == 0xf { relative } else { relative.keep(mask) }
             }
             #[inline(always)]
+            fn twice(mut here: Self::Held) -> Self::Held {
+                for k in 0..N {
+                    here[k] += here[k];
+                }
+                here
+            }
+            #[inline(always)]
+            fn bend(after: Self::Held, before: Self::Held, twice: Self::Held) -> Self {
+                let mut bend = Array([0.0; N]);
+                for k in 0..N {
+                    bend.0[k] = ((after[k] + before[k]) - twice[k]) as $bond;
+                }
+                bend
+            }
+            #[inline(always)]
             unsafe fn store(self, target: *mut $field) {
                 let mut values = [0.0; N];
                 for k in 0..N {

@@ -267,6 +267,14 @@ impl Ends<f64> for F64 {
         kept(F64(there) - F64(here), mask)
     }
     #[inline(always)]
+    fn twice(here: Self::Held) -> Self::Held {
+        (F64(here) + F64(here)).0
+    }
+    #[inline(always)]
+    fn bend(after: Self::Held, before: Self::Held, twice: Self::Held) -> Self {
+        F64(after) + F64(before) - F64(twice)
+    }
+    #[inline(always)]
     unsafe fn store(self, target: *mut f64) {
         unsafe {
             _mm256_storeu_pd(target, self.0[0]);
@@ -296,6 +304,14 @@ impl Ends<f32> for F32 {
         kept(F32(there) - F32(here), mask)
     }
     #[inline(always)]
+    fn twice(here: Self::Held) -> Self::Held {
+        (F32(here) + F32(here)).0
+    }
+    #[inline(always)]
+    fn bend(after: Self::Held, before: Self::Held, twice: Self::Held) -> Self {
+        F32(after) + F32(before) - F32(twice)
+    }
+    #[inline(always)]
     unsafe fn store(self, target: *mut f32) {
         unsafe { _mm256_storeu_ps(target, self.0) }
     }
@@ -319,8 +335,15 @@ impl Ends<f64> for F32 {
     }
     #[inline(always)]
     fn relative(there: Self::Held, here: Self::Held, mask: u16) -> Self {
-        let F64([low, high]) = F64(there) - F64(here);
-        unsafe { kept(F32(_mm256_set_m128(_mm256_cvtpd_ps(high), _mm256_cvtpd_ps(low))), mask) }
+        kept(narrow(F64(there) - F64(here)), mask)
+    }
+    #[inline(always)]
+    fn twice(here: Self::Held) -> Self::Held {
+        <F64 as Ends<f64>>::twice(here)
+    }
+    #[inline(always)]
+    fn bend(after: Self::Held, before: Self::Held, twice: Self::Held) -> Self {
+        narrow(<F64 as Ends<f64>>::bend(after, before, twice))
     }
     #[inline(always)]
     unsafe fn store(self, target: *mut f64) {
@@ -335,4 +358,9 @@ impl Ends<f64> for F32 {
 #[inline(always)]
 fn kept<B: crate::field::Number, V: Pack<B>>(pack: V, mask: u16) -> V {
     if mask & 0xff == 0xff { pack } else { pack.keep(mask) }
+}
+
+#[inline(always)]
+fn narrow(F64([low, high]): F64) -> F32 {
+    unsafe { F32(_mm256_set_m128(_mm256_cvtpd_ps(high), _mm256_cvtpd_ps(low))) }
 }

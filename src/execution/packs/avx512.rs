@@ -270,6 +270,14 @@ impl Ends<f64> for F64 {
         unsafe { F64([_mm512_maskz_sub_pd(low, there[0], here[0]), _mm512_maskz_sub_pd(high, there[1], here[1])]) }
     }
     #[inline(always)]
+    fn twice(here: Self::Held) -> Self::Held {
+        (F64(here) + F64(here)).0
+    }
+    #[inline(always)]
+    fn bend(after: Self::Held, before: Self::Held, twice: Self::Held) -> Self {
+        F64(after) + F64(before) - F64(twice)
+    }
+    #[inline(always)]
     unsafe fn store(self, target: *mut f64) {
         unsafe {
             _mm512_storeu_pd(target, self.0[0]);
@@ -299,6 +307,14 @@ impl Ends<f32> for F32 {
         unsafe { F32(_mm512_maskz_sub_ps(mask, there, here)) }
     }
     #[inline(always)]
+    fn twice(here: Self::Held) -> Self::Held {
+        (F32(here) + F32(here)).0
+    }
+    #[inline(always)]
+    fn bend(after: Self::Held, before: Self::Held, twice: Self::Held) -> Self {
+        F32(after) + F32(before) - F32(twice)
+    }
+    #[inline(always)]
     unsafe fn store(self, target: *mut f32) {
         unsafe { _mm512_storeu_ps(target, self.0) }
     }
@@ -322,11 +338,15 @@ impl Ends<f64> for F32 {
     }
     #[inline(always)]
     fn relative(there: Self::Held, here: Self::Held, mask: u16) -> Self {
-        unsafe {
-            let low = _mm512_cvtpd_ps(_mm512_sub_pd(there[0], here[0]));
-            let high = _mm512_cvtpd_ps(_mm512_sub_pd(there[1], here[1]));
-            F32(_mm512_maskz_insertf32x8::<1>(mask, _mm512_castps256_ps512(low), high))
-        }
+        narrow(F64(there) - F64(here)).keep(mask)
+    }
+    #[inline(always)]
+    fn twice(here: Self::Held) -> Self::Held {
+        <F64 as Ends<f64>>::twice(here)
+    }
+    #[inline(always)]
+    fn bend(after: Self::Held, before: Self::Held, twice: Self::Held) -> Self {
+        narrow(<F64 as Ends<f64>>::bend(after, before, twice))
     }
     #[inline(always)]
     unsafe fn store(self, target: *mut f64) {
@@ -335,4 +355,9 @@ impl Ends<f64> for F32 {
             _mm512_storeu_pd(target.add(8), _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(self.0)));
         }
     }
+}
+
+#[inline(always)]
+fn narrow(F64([low, high]): F64) -> F32 {
+    unsafe { F32(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm512_cvtpd_ps(low)), _mm512_cvtpd_ps(high))) }
 }

@@ -132,6 +132,10 @@ pub trait Ends<F: Number>: Sized {
     unsafe fn gather(records: *const [F; 4], index: *const u32) -> [Self::Held; 4];
     /// Values there less values here, zero in lanes without a bit.
     fn relative(there: Self::Held, here: Self::Held, mask: u16) -> Self;
+    /// Twice the values.
+    fn twice(here: Self::Held) -> Self::Held;
+    /// Values on two sides, added, less twice the values between.
+    fn bend(after: Self::Held, before: Self::Held, twice: Self::Held) -> Self;
     /// # Safety
     /// There must be room for as many numbers as there are lanes.
     unsafe fn store(self, target: *mut F);

@@ -91,6 +91,8 @@ const STRETCH: [f64; 7] = [
 const STRETCH_SINGLE: [f64; 4] = [1.0 / 2.0, -1.0 / 8.0, 1.0 / 16.0, -5.0 / 128.0];
 
 impl<const D: usize> BondLaw<D> for BondBasedLinear {
+    const LINEAR: bool = true;
+
     #[inline(always)]
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
         let mut along = eta[0] * bond.xi[0];
@@ -132,10 +134,10 @@ fn along_deformed<const D: usize, L: Lane>(bond: &Bond<D, L>, eta: &[L; D], fact
     sum
 }
 
-/// ½ ω c s² |ξ|
+/// ½ ω c s² |ξ|, without s², which single precision may not hold.
 #[inline(always)]
 fn spring_energy<const D: usize, L: Lane>(bond: &Bond<D, L>, stretch: L) -> L {
-    L::splat(0.5) * bond.weight * bond.length * (stretch * stretch)
+    L::splat(0.5) * bond.weight * bond.length * stretch * stretch
 }
 
 #[cfg(test)]

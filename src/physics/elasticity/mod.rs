@@ -61,17 +61,16 @@ impl<L> Elasticity<L> {
         L: BondLaw<D>,
     {
         let kernel = Force(self.law);
-        let (input, output) = (components::<D, _>(&state.displacement), components_mut::<D, _>(&mut state.force));
-        let rule = Breaking::<D, L, P::Field> {
-            failure: self.failure.as_ref(),
-            law: self.law,
-            displacement: input,
-            velocity: components::<D, _>(&state.velocity),
-            dt,
-        };
         let weights = &self.operator.weights;
-        let now =
-            exec.sum_bonds_and_break::<D, D, D, P>(body, weights, &mut state.states, input, output, &kernel, &rule);
+        let (input, output) = (components::<D, _>(&state.displacement), components_mut::<D, _>(&mut state.force));
+        let Some(failure) = &self.failure else {
+            exec.sum_bonds::<D, D, D, P>(body, weights, &state.states, input, output, &kernel);
+            return;
+        };
+        let (law, velocity) = (self.law, components::<D, _>(&state.velocity));
+        let rule = Breaking::<D, L, P::Field> { failure, law, displacement: input, velocity, dt };
+        let states = &mut state.states;
+        let now = exec.sum_bonds_and_break::<D, D, D, P>(body, weights, states, input, output, &kernel, &rule);
         state.broken.bonds += now.bonds;
         state.broken.energy += now.energy;
     }
@@ -140,6 +139,7 @@ struct Force<L>(L);
 
 impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, D> for Force<B> {
     const SMALL: f64 = B::SMALL;
+    const LINEAR: bool = B::LINEAR;
 
     #[inline(always)]
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
@@ -191,9 +191,9 @@ impl<const D: usize> BondKernel<D, 0, 1> for Weight {
     }
 }
 
-/// The critical stretch, if bonds can break, and what is needed to know the energy that a broken bond takes.
+/// The critical stretch, and what is needed to know the energy that a broken bond takes.
 struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
-    failure: Option<&'a CriticalStretch>,
+    failure: &'a CriticalStretch,
     law: L,
     displacement: [&'a [F]; D],
     velocity: [&'a [F]; D],
@@ -202,11 +202,11 @@ struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
 
 impl<const D: usize, L: BondLaw<D>, F: Number> BreakRule<D> for Breaking<'_, D, L, F> {
     fn threshold(&self) -> f64 {
-        self.failure.map_or(f64::INFINITY, |failure| self.law.strain_at(failure.smallest()))
+        self.law.strain_at(self.failure.smallest())
     }
 
     fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
-        self.failure.is_some_and(|failure| strain > self.law.strain_at(failure.of(here, there)))
+        strain > self.law.strain_at(self.failure.of(here, there))
     }
 
     /// Half of w(η) + ½ f(η)·Δη, with η at the start of the step in which the bond breaks and Δη its change in the
