@@ -186,14 +186,14 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         let volume = self.view.lattice.cell_volume();
         let threshold = rule.threshold();
         let mut broken = Broken::default();
-        for part in 0..BLOCK / V::LANES {
-            let first = slot + part * V::LANES;
-            // SAFETY: as in `sum_on`.
-            let here = unsafe { self.hold::<V>(first) };
-            for (k, word) in words.iter_mut().enumerate() {
+        // Offset by offset, so that energies are added in the same order whatever the lanes of a pack.
+        for (k, word) in words.iter_mut().enumerate() {
+            for part in 0..BLOCK / V::LANES {
+                let first = slot + part * V::LANES;
                 let mask = *word >> (part * V::LANES);
                 // SAFETY: as in `sum_on`.
                 let strain = unsafe {
+                    let here = self.hold::<V>(first);
                     let relative = self.relative::<V>(k, first, &here, mask);
                     self.kernel.strain(&self.bond::<V>(k), &relative)
                 };
