@@ -16,6 +16,10 @@ macro_rules! compiled {
         pub unsafe fn $name<$(const $n: $type)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
             // SAFETY: `Instructions` are given out for this machine alone.
             unsafe {
+                if D == 1 {
+                    // Bars are small: a third of the kernels need not be compiled.
+                    return self.$generic::<P::Baseline, $($n)? $($t)?>($($argument),*);
+                }
                 match self.instructions {
                     #[cfg(target_arch = "x86_64")]
                     Instructions::Avx512 => self.$avx512::<$($n)? $($t)?>($($argument),*),
