@@ -229,8 +229,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         let n = cloud.n_points();
         let [strain, scale, ..] = self.exec.sum(n, |points| {
             let (mut strain, mut scale) = (0.0, 0.0);
-            for &slot in &cloud.slots[points] {
-                let slot = slot as usize;
+            for slot in cloud.stored(points) {
                 let volume = cloud.volume(slot);
                 strain += density[slot].to_f64() * volume;
                 scale += rho * volume * v.iter().map(|v| v[slot].to_f64().powi(2)).sum::<f64>().sqrt();
@@ -246,8 +245,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         };
         let angular = self.exec.sum(n, |points| {
             let mut sum = [0.0; 4];
-            for &slot in &cloud.slots[points] {
-                let slot = slot as usize;
+            for slot in cloud.stored(points) {
                 let x = cloud.position(slot);
                 let y = embed::<D>(&std::array::from_fn(|d| x[d] + u[d][slot].to_f64()));
                 let p = momentum_of(slot);

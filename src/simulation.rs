@@ -206,7 +206,9 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Model<D, L, P> {
         let positions: Vec<[f64; 3]> = cloud.slots.iter().map(|&s| embed(&cloud.position(s as usize))).collect();
         let sizes = match &cloud.arrangement {
             Arrangement::Lattice(_) => Vec::new(),
-            Arrangement::Scattered { volumes, .. } => volumes.iter().map(|v| v.powf(1.0 / D as f64)).collect(),
+            Arrangement::Scattered { volumes, .. } => {
+                cloud.slots.iter().map(|&s| volumes[s as usize].powf(1.0 / D as f64)).collect()
+            }
         };
         let state_bytes = match &problem.state.states {
             BondStates::Lattice(words) => 2 * words.len(),

@@ -378,7 +378,8 @@ impl<const D: usize> Builder<'_, D> {
         let points = import::csv::read::<D>(&path)?;
         let mut cloud = Cloud::scattered(points.positions, points.volumes);
         for (name, members) in points.sets {
-            cloud.sets.insert(name, members);
+            let slots = cloud.slots_of(&members);
+            cloud.sets.insert(name, slots);
         }
         Ok(cloud)
     }
@@ -442,7 +443,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     fn sets(&self, cloud: &mut Cloud<D>, shape: Option<&Shape<D>>) -> Result<()> {
-        let all = cloud.slots.clone();
+        let all = cloud.select(|_| true);
         let mut found = BTreeMap::new();
         for (name, region) in &self.case.value.sets {
             let path = format!("sets.{name}");
@@ -534,11 +535,13 @@ impl<const D: usize> Builder<'_, D> {
     /// The formula on the points of a set, refused if it has no finite value at one of them at t = 0.
     fn profile(&self, formula: &Formula, cloud: &Cloud<D>, slots: &Arc<[u32]>, path: &str) -> Result<Profile> {
         let mut profile = Profile::new(self.expression(formula)?, cloud, slots);
-        let bad = profile.at(0.0).iter().copied().enumerate().find(|(_, v)| !v.is_finite());
-        if let Some((k, value)) = bad {
-            let slot = slots[k] as usize;
-            let point = cloud.slots.binary_search(&slots[k]).unwrap_or(k);
-            let position = rounded(&cloud.position(slot));
+        let values = profile.at(0.0);
+        if values.iter().any(|v| !v.is_finite()) {
+            // The first bad point in point order, which is not the order of slots.
+            let bad = |slot: &u32| slots.binary_search(slot).ok().map(|k| values[k]).filter(|v| !v.is_finite());
+            let first = cloud.slots.iter().enumerate().find_map(|(point, slot)| Some((point, *slot, bad(slot)?)));
+            let (point, slot, value) = first.expect("a set holds slots of points");
+            let position = rounded(&cloud.position(slot as usize));
             let message = format!("the formula is {value} at t = 0 at point {point}, position {position} m");
             let help = "keep it finite everywhere in the set, as in `sqrt(max(x, 0))` or `if(x > 0, 1/x, 0)`";
             return Err(self.refuse(path, message, help));

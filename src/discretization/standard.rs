@@ -6,8 +6,10 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::{Influence, PartialVolume};
-use crate::family::{Body, Families};
+use crate::family::{Body, CloudFamilies, Families, GROUP};
 use crate::field::{Vector, difference};
 use crate::geometry::Arrangement;
 
@@ -49,8 +51,7 @@ enum Fractions {
 /// A body for the standard scheme: families that hold every x′ whose cell reaches into the horizon of x.
 pub fn body<const D: usize>(cloud: crate::geometry::Cloud<D>, horizon: f64, rule: PartialVolume) -> Body<D> {
     let spacing = cloud.spacing;
-    let reach = rule.reach::<D>(spacing, horizon);
-    Body::new(cloud, horizon, reach, |xi| rule.fraction(xi, spacing, horizon) > 0.0)
+    Body::new(cloud, horizon, rule.rim::<D>(spacing, horizon), |xi| rule.touches(xi, spacing, horizon))
 }
 
 impl Operator {
@@ -86,12 +87,18 @@ impl Operator {
                             let xi: Vector<D> = difference(&positions[j as usize], &positions[i]);
                             (rule.fraction(&xi, spacing, horizon) * 65535.0).round() as u16
                         };
-                        use rayon::prelude::*;
-                        let rows: Vec<Vec<u16>> = (0..positions.len())
-                            .into_par_iter()
-                            .map(|i| families.neighbours[families.of(i)].iter().map(|&j| fraction(i, j)).collect())
-                            .collect();
-                        Fractions::Stored(rows.concat().into())
+                        let mut stored: Arc<[u16]> = std::iter::repeat_n(0, families.neighbours.len()).collect();
+                        let values = Arc::get_mut(&mut stored).expect("nobody else has it yet");
+                        let pieces = CloudFamilies::pieces(&families.starts, values, GROUP);
+                        pieces.into_par_iter().for_each(|(points, values)| {
+                            let mut values = values.iter_mut();
+                            for i in points {
+                                for (&j, value) in families.neighbours[families.of(i)].iter().zip(&mut values) {
+                                    *value = fraction(i, j);
+                                }
+                            }
+                        });
+                        Fractions::Stored(stored)
                     }
                 };
                 let weights = CloudWeights { strength, influence, horizon, spacing, fractions };

@@ -11,6 +11,7 @@
 //!
 //! Deliberately absent: moving the quadrature point to the centroid of the part inside.
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use super::quadrature::gauss_legendre;
@@ -68,16 +69,30 @@ impl PartialVolume {
         }
     }
 
+    /// Distances between which only [`touches`](Self::touches) knows whether β > 0: at less it is, beyond it is not.
+    pub fn rim<const D: usize>(&self, spacing: f64, horizon: f64) -> Range<f64> {
+        let start = match self {
+            PartialVolume::None | PartialVolume::Exact => horizon,
+            PartialVolume::Ramp => (horizon + 0.5 * spacing) * (1.0 - 2.0 * RIM_TOLERANCE),
+        };
+        start..self.reach::<D>(spacing, horizon)
+    }
+
+    /// Whether any of the cell lies inside the ball: β > 0, up to rounding, without the work for β itself.
+    pub fn touches<const D: usize>(&self, xi: &[f64; D], spacing: f64, horizon: f64) -> bool {
+        match self {
+            PartialVolume::None | PartialVolume::Ramp => self.fraction(xi, spacing, horizon) > 0.0,
+            PartialVolume::Exact => nearest(sorted(xi), spacing) < horizon * (1.0 - RIM_TOLERANCE),
+        }
+    }
+
     /// Volume fraction β of the cell of side `spacing` centred at `xi` from the source, for the
     /// ball of radius `horizon`.
     ///
     /// Between 0 and 1, without unit; the weight of the bond is β V. On a cloud without a lattice,
     /// `spacing` is the neighbour's V^(1/D).
     pub fn fraction<const D: usize>(&self, xi: &[f64; D], spacing: f64, horizon: f64) -> f64 {
-        // Sorted absolute values: images under the symmetries of the lattice become the same
-        // numbers in the same order.
-        let mut distances = xi.map(f64::abs);
-        distances.sort_by(f64::total_cmp);
+        let distances = sorted(xi);
         match self {
             PartialVolume::None => {
                 if norm(distances) <= horizon * (1.0 + RIM_TOLERANCE) {
@@ -90,6 +105,13 @@ impl PartialVolume {
             PartialVolume::Exact => exact(distances, spacing, horizon),
         }
     }
+}
+
+/// Absolute values in order: images under the symmetries of the lattice become the same numbers.
+fn sorted<const D: usize>(xi: &[f64; D]) -> [f64; D] {
+    let mut distances = xi.map(f64::abs);
+    distances.sort_by(f64::total_cmp);
+    distances
 }
 
 fn norm<const D: usize>(xi: [f64; D]) -> f64 {
@@ -112,7 +134,7 @@ fn exact<const D: usize>(centre: [f64; D], spacing: f64, horizon: f64) -> f64 {
     if norm(centre.map(|x| x + half)) <= horizon * (1.0 + RIM_TOLERANCE) {
         return 1.0;
     }
-    if norm(centre.map(|x| (x - half).max(0.0))) >= horizon * (1.0 - RIM_TOLERANCE) {
+    if nearest(centre, spacing) >= horizon * (1.0 - RIM_TOLERANCE) {
         return 0.0;
     }
     let side = |i: usize| (centre[i] - half, centre[i] + half);
@@ -123,6 +145,11 @@ fn exact<const D: usize>(centre: [f64; D], spacing: f64, horizon: f64) -> f64 {
         _ => unreachable!("space has one, two or three dimensions, got {D}"),
     };
     (inside / spacing.powi(D as i32)).clamp(0.0, 1.0)
+}
+
+/// Distance of the nearest point of a cell.
+fn nearest<const D: usize>(centre: [f64; D], spacing: f64) -> f64 {
+    norm(centre.map(|x| (x - 0.5 * spacing).max(0.0)))
 }
 
 /// Length of the interval inside [−δ, δ].
@@ -315,6 +342,38 @@ mod tests {
                 assert_eq!(rule.fraction(&[-y, x], 0.9, horizon).to_bits(), flat, "{rule:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_cell_touches_the_ball_where_its_fraction_is_above_zero() {
+        fn check<const D: usize>(rule: PartialVolume) {
+            let (spacing, horizon) = (0.7, 2.3);
+            let rim = rule.rim::<D>(spacing, horizon);
+            let rule_at = |xi: &[f64; D]| {
+                let beta = rule.fraction(xi, spacing, horizon);
+                assert_eq!(rule.touches(xi, spacing, horizon), beta > 0.0, "{rule:?} {xi:?}");
+                assert!(beta > 0.0 || norm(*xi) > rim.start, "{rule:?} {xi:?}");
+                assert!(beta == 0.0 || norm(*xi) <= rim.end, "{rule:?} {xi:?}");
+            };
+            for step in 0..4000 {
+                let s = f64::from(step);
+                let xi: [f64; 3] = [3.0 * (0.7 * s).sin(), 3.0 * (1.3 * s).cos(), 3.0 * (2.1 * s).sin()];
+                let xi: [f64; D] = std::array::from_fn(|d| xi[d]);
+                rule_at(&xi);
+                let to_edge = |r: f64| xi.map(|x| x * r / norm(xi));
+                for edge in [horizon, rim.start, rim.end] {
+                    for noise in [-1e-6, -1e-12, 0.0, 1e-12, 1e-6] {
+                        rule_at(&to_edge(edge + noise));
+                    }
+                }
+            }
+        }
+        for rule in PartialVolume::ALL {
+            check::<1>(rule);
+            check::<2>(rule);
+        }
+        check::<3>(PartialVolume::None);
+        check::<3>(PartialVolume::Ramp);
     }
 
     #[test]

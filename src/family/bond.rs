@@ -79,5 +79,5 @@ pub trait BondLaw<const D: usize>: Copy + Send + Sync {
         self.energy(bond, strain)
     }
     /// Spring constant of the bond at rest, weighted: derivative of the force along ξ by η along ξ.
-    fn tangent(&self, length: f64, weight: f64) -> f64;
+    fn tangent<L: Lane>(&self, length: L, weight: L) -> L;
 }

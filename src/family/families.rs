@@ -71,6 +71,7 @@ pub const GROUP: usize = 16;
 pub struct CloudFamilies {
     /// First group of [`GROUP`] neighbours of each point, and one past the last.
     pub starts: Vec<u64>,
+    /// Ascending in each family, the padding behind.
     pub neighbours: Vec<u32>,
     pub sites: Sites,
 }
@@ -127,17 +128,21 @@ impl Sites {
     }
 }
 
+/// Points that a thread takes at once when families, and what is stored for their bonds, are set up.
+pub(super) const PIECE: usize = 512;
+
 impl<const D: usize> Body<D> {
-    /// Finds the families of `cloud`: all x′ with 0 < |ξ| ≤ `reach` for which `accept(ξ)` holds.
+    /// Finds the families of `cloud`: all x′ ≠ x with |ξ| ≤ `rim.start`, and those with |ξ| ≤ `rim.end` for which
+    /// `accept(ξ)` holds.
     ///
-    /// `reach` and `accept` come from the partial-volume rule, which knows how far beyond δ a cell still matters.
-    pub fn new(cloud: Cloud<D>, horizon: f64, reach: f64, accept: impl Fn(&Vector<D>) -> bool + Sync) -> Self {
+    /// `rim` and `accept` come from the partial-volume rule, which knows how far beyond δ a cell still matters.
+    pub fn new(cloud: Cloud<D>, horizon: f64, rim: Range<f64>, accept: impl Fn(&Vector<D>) -> bool + Sync) -> Self {
         let families = match &cloud.arrangement {
             Arrangement::Lattice(lattice) => {
-                Families::Lattice(LatticeFamilies::new(lattice, &cloud.slots, reach, accept))
+                Families::Lattice(LatticeFamilies::new(lattice, &cloud.slots, rim, accept))
             }
             Arrangement::Scattered { positions, volumes } => {
-                let mut families = search::families(positions, reach, accept);
+                let mut families = search::families(positions, rim, accept);
                 families.sites = Sites::new(positions, volumes);
                 Families::Cloud(families)
             }
@@ -147,15 +152,15 @@ impl<const D: usize> Body<D> {
 }
 
 impl<const D: usize> LatticeFamilies<D> {
-    fn new(lattice: &Lattice<D>, slots: &[u32], reach: f64, accept: impl Fn(&Vector<D>) -> bool) -> Self {
+    fn new(lattice: &Lattice<D>, slots: &[u32], rim: Range<f64>, accept: impl Fn(&Vector<D>) -> bool) -> Self {
         let h = lattice.spacing;
-        let n = (reach / h).ceil() as i32;
+        let n = (rim.end / h).ceil() as i32;
         // Steps with no negative component: each stands for its mirror images.
         let mut steps: Vec<[i32; D]> = Vec::new();
         crate::geometry::cloud::for_each_cell([n as usize + 1; D], |cell| {
             let step = cell.map(|c| c as i32);
             let xi = step.map(|c| f64::from(c) * h);
-            if step != [0; D] && norm(&xi) <= reach && accept(&xi) {
+            if step != [0; D] && (norm(&xi) <= rim.start || norm(&xi) <= rim.end && accept(&xi)) {
                 steps.push(step);
             }
         });
@@ -220,6 +225,19 @@ impl CloudFamilies {
     pub fn of(&self, point: usize) -> Range<usize> {
         self.starts[point] as usize * GROUP..self.starts[point + 1] as usize * GROUP
     }
+
+    /// Splits what is stored with `size` values a group of [`GROUP`] bonds into the shares of consecutive points.
+    pub fn pieces<'a, T>(starts: &[u64], mut values: &'a mut [T], size: usize) -> Vec<(Range<usize>, &'a mut [T])> {
+        let n_points = starts.len() - 1;
+        let piece = |first: usize| {
+            let points = first..(first + PIECE).min(n_points);
+            let groups = (starts[points.end] - starts[points.start]) as usize;
+            let (share, rest) = std::mem::take(&mut values).split_at_mut(groups * size);
+            values = rest;
+            (points, share)
+        };
+        (0..n_points).step_by(PIECE).map(piece).collect()
+    }
 }
 
 #[cfg(test)]
@@ -230,7 +248,7 @@ mod tests {
     #[test]
     fn offsets_of_a_lattice_are_the_points_of_a_ball_in_mirror_sequences() {
         let cube = Shape::Box { low: [0.0; 3], high: [1.0; 3] };
-        let body = Body::new(Cloud::lattice(&cube, 0.1, 3), 0.3, 0.3 * (1.0 + 1e-9), |_| true);
+        let body = Body::new(Cloud::lattice(&cube, 0.1, 3), 0.3, 0.3..0.3 * (1.0 + 1e-9), |_| true);
         let Families::Lattice(families) = &body.families else { panic!("a lattice") };
         assert_eq!(families.offsets.len(), 122);
         let mut next = 0;

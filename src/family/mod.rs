@@ -4,6 +4,7 @@ pub mod bond;
 pub mod families;
 pub mod search;
 pub mod states;
+mod tree;
 
 pub use bond::{Bond, BondKernel, BondLaw};
 pub use families::{Body, Class, CloudFamilies, Families, FixedSites, GROUP, LatticeFamilies, Offset, Sites};

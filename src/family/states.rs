@@ -4,7 +4,9 @@
 //! load; on a cloud so are the bits of [`GROUP`] consecutive bonds of one point. A bond has two bits, one at each end, which
 //! each end's own sum reads and clears; both ends see the same stretch to the last bit and so decide alike.
 
-use super::{Body, Families, GROUP};
+use rayon::prelude::*;
+
+use super::{Body, CloudFamilies, Families, GROUP};
 use crate::geometry::lattice::BLOCK;
 use crate::geometry::{Arrangement, Crack};
 
@@ -30,7 +32,6 @@ impl BondStates {
                 let first = lattice.guard / BLOCK;
                 let row_blocks = lattice.counts[0].div_ceil(BLOCK);
                 let mut words = vec![0u16; lattice.n_blocks() * n_offsets];
-                use rayon::prelude::*;
                 words.par_chunks_mut(n_offsets).enumerate().for_each(|(block, words)| {
                     let here = present[first + block];
                     if here == 0 {
@@ -57,13 +58,19 @@ impl BondStates {
             }
             (_, Families::Cloud(families)) => {
                 let mut words = vec![0u16; families.neighbours.len() / GROUP];
-                for point in 0..body.cloud.n_points() {
-                    for bond in families.of(point) {
-                        if families.neighbours[bond] as usize != point {
-                            words[bond / GROUP] |= 1 << (bond % GROUP);
-                        }
+                let pieces = CloudFamilies::pieces(&families.starts, &mut words, 1);
+                pieces.into_par_iter().for_each(|(points, words)| {
+                    words.fill(u16::MAX);
+                    let first = families.starts[points.start];
+                    for point in points {
+                        // Padding stands at the end of a family.
+                        let Some(last) = families.neighbours[families.of(point)].last_chunk::<GROUP>() else {
+                            continue;
+                        };
+                        let bonds = last.iter().filter(|&&other| other as usize != point).count();
+                        words[(families.starts[point + 1] - first) as usize - 1] = u16::MAX >> (GROUP - bonds);
                     }
-                }
+                });
                 BondStates::Cloud(words)
             }
             _ => unreachable!("families are built from the arrangement of their cloud"),
@@ -168,12 +175,12 @@ mod tests {
     #[test]
     fn bonds_of_a_disk_join_present_points_only_and_come_in_pairs() {
         let disk = Shape::Ball { center: [0.0, 0.0], radius: 1.0 };
-        let body = Body::new(Cloud::lattice(&disk, 0.07, 3), 0.21, 0.21 * (1.0 + 1e-9), |_| true);
+        let body = Body::new(Cloud::lattice(&disk, 0.07, 3), 0.21, 0.21..0.21 * (1.0 + 1e-9), |_| true);
         let scattered = Cloud::scattered(
             body.cloud.slots.iter().map(|&s| body.cloud.position(s as usize)).collect(),
             vec![0.07 * 0.07; body.cloud.n_points()],
         );
-        let same = Body::new(scattered, 0.21, 0.21 * (1.0 + 1e-9), |_| true);
+        let same = Body::new(scattered, 0.21, 0.21..0.21 * (1.0 + 1e-9), |_| true);
         let whole = BondStates::whole(&body);
         assert_eq!(whole.count(), BondStates::whole(&same).count());
         assert_eq!(whole.count() % 2, 0);

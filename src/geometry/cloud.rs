@@ -1,9 +1,13 @@
 //! All points of a body: where they are, how much matter each stands for, which sets they belong to.
 //!
-//! Points are numbered in point order (what files and reports show); fields are stored in slots, which are the points
-//! themselves for a scattered cloud and the cells of a padded box for a lattice.
+//! Points are numbered in point order (what files and reports show); fields are stored in slots, which are places along
+//! a space-filling curve for a scattered cloud and the cells of a padded box for a lattice.
 
-use super::{Lattice, PointSets, Shape};
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::{Lattice, PointSets, Shape, curve};
 use crate::field::Vector;
 
 /// How the points of a cloud lie.
@@ -11,7 +15,7 @@ use crate::field::Vector;
 pub enum Arrangement<const D: usize> {
     /// Cells of a box; a point's place follows from its slot.
     Lattice(Lattice<D>),
-    /// Anywhere. Positions in m; volumes in m³ (3D), m² (2D), m (1D). Slots are points.
+    /// Anywhere, slot by slot along a curve. Positions in m; volumes in m³ (3D), m² (2D), m (1D).
     Scattered { positions: Vec<Vector<D>>, volumes: Vec<f64> },
 }
 
@@ -19,7 +23,7 @@ pub enum Arrangement<const D: usize> {
 #[derive(Debug, Clone)]
 pub struct Cloud<const D: usize> {
     pub arrangement: Arrangement<D>,
-    /// Slot of each point, ascending.
+    /// Slot of each point; ascending on a lattice.
     pub slots: Vec<u32>,
     /// Δx, m: the lattice spacing, or the mean of volume^(1/D) of a scattered cloud.
     pub spacing: f64,
@@ -51,11 +55,17 @@ impl<const D: usize> Cloud<D> {
         Cloud { arrangement: Arrangement::Lattice(lattice), slots, spacing, sets: PointSets::default() }
     }
 
-    /// Points anywhere, with their volumes.
+    /// Points anywhere, with their volumes, stored along a Hilbert curve.
     pub fn scattered(positions: Vec<Vector<D>>, volumes: Vec<f64>) -> Self {
         assert_eq!(positions.len(), volumes.len(), "each point has a volume");
         let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
-        let slots = (0..positions.len() as u32).collect();
+        let order = curve::order(&positions);
+        let mut slots = vec![0; order.len()];
+        for (slot, &point) in order.iter().enumerate() {
+            slots[point as usize] = slot as u32;
+        }
+        let positions = order.par_iter().map(|&point| positions[point as usize]).collect();
+        let volumes = order.par_iter().map(|&point| volumes[point as usize]).collect();
         Cloud {
             arrangement: Arrangement::Scattered { positions, volumes },
             slots,
@@ -107,9 +117,23 @@ impl<const D: usize> Cloud<D> {
         (low, high)
     }
 
+    /// The slots that hold a point, from the `range.start`-th on, ascending: the order in which memory is walked.
+    #[inline]
+    pub fn stored(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
+        let lattice = matches!(self.arrangement, Arrangement::Lattice(_));
+        range.map(move |k| if lattice { self.slots[k] as usize } else { k })
+    }
+
     /// Slots of the points for which `inside` holds, ascending.
     pub fn select(&self, mut inside: impl FnMut(&Vector<D>) -> bool) -> Vec<u32> {
-        self.slots.iter().copied().filter(|&slot| inside(&self.position(slot as usize))).collect()
+        self.stored(0..self.n_points()).filter(|&slot| inside(&self.position(slot))).map(|slot| slot as u32).collect()
+    }
+
+    /// Slots of points, ascending.
+    pub fn slots_of(&self, points: &[u32]) -> Vec<u32> {
+        let mut slots: Vec<u32> = points.iter().map(|&point| self.slots[point as usize]).collect();
+        slots.sort_unstable();
+        slots
     }
 }
 
@@ -148,6 +172,25 @@ mod tests {
         let area = cloud.n_points() as f64 * 0.05 * 0.05;
         // The staircase misses or adds cells along the rim: a fraction of perimeter × spacing.
         assert!((area - std::f64::consts::PI).abs() < 0.05 * 2.0 * std::f64::consts::PI * 0.25, "{area}");
+    }
+
+    #[test]
+    fn a_scattered_cloud_keeps_every_point_with_its_volume_and_answers_in_ascending_slots() {
+        let positions: Vec<Vector<2>> = (0..500).map(|i| [f64::from(i * 17 % 101), f64::from(i * 29 % 97)]).collect();
+        let volumes: Vec<f64> = (1..=500).map(f64::from).collect();
+        let cloud = Cloud::scattered(positions.clone(), volumes.clone());
+        for (point, &slot) in cloud.slots.iter().enumerate() {
+            assert_eq!(cloud.position(slot as usize), positions[point]);
+            assert_eq!(cloud.volume(slot as usize), volumes[point]);
+        }
+        let mut slots = cloud.slots.clone();
+        slots.sort_unstable();
+        assert!(slots.iter().copied().eq(0..500), "slots are a permutation");
+        assert!(!cloud.slots.is_sorted(), "this one is no identity");
+        let left = cloud.select(|x| x[0] < 50.0);
+        assert!(left.is_sorted() && left.len() == positions.iter().filter(|x| x[0] < 50.0).count());
+        let members: Vec<u32> = (0..500).filter(|&i| positions[i as usize][0] < 50.0).collect();
+        assert_eq!(cloud.slots_of(&members), left);
     }
 
     #[test]

@@ -6,6 +6,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use crate::case::diagnostics::shorten;
 use crate::error::{Error, Result};
 use crate::field::Vector;
@@ -131,7 +133,7 @@ fn twins<const D: usize>(positions: &[Vector<D>]) -> Option<(usize, usize)> {
     let mut order: Vec<usize> = (0..positions.len()).collect();
     // Adding 0 makes one zero of the two.
     let key = |&i: &usize| positions[i].map(|x| (x + 0.0).to_bits());
-    order.sort_unstable_by_key(|i| (key(i), *i));
+    order.par_sort_unstable_by_key(|i| (key(i), *i));
     order.windows(2).find(|pair| key(&pair[0]) == key(&pair[1])).map(|pair| (pair[0], pair[1]))
 }
 

@@ -59,7 +59,8 @@ impl<const D: usize> BondLaw<D> for BondBased {
         spring_energy(bond, strain * series)
     }
 
-    fn tangent(&self, length: f64, weight: f64) -> f64 {
+    #[inline(always)]
+    fn tangent<L: Lane>(&self, length: L, weight: L) -> L {
         weight / length
     }
 }
@@ -120,7 +121,8 @@ impl<const D: usize> BondLaw<D> for BondBasedLinear {
         spring_energy(bond, strain)
     }
 
-    fn tangent(&self, length: f64, weight: f64) -> f64 {
+    #[inline(always)]
+    fn tangent<L: Lane>(&self, length: L, weight: L) -> L {
         weight / length
     }
 }

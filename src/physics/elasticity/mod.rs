@@ -8,8 +8,7 @@ pub mod moduli;
 use crate::discretization::{BondWeights, Operator};
 use crate::execution::{BreakRule, Broken, Exec, Packs};
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
-use crate::field::{Double, Number, Precision, components, components_mut, difference, dot, norm};
-use crate::geometry::Arrangement;
+use crate::field::{Double, Number, Precision, components, components_mut, dot};
 use crate::lane::Lane;
 use crate::physics::failure::CriticalStretch;
 
@@ -109,24 +108,16 @@ impl<L> Elasticity<L> {
     where
         L: BondLaw<D>,
     {
-        let stiffest = match (&body.families, &self.operator.weights, &body.cloud.arrangement) {
-            (Families::Lattice(families), BondWeights::Lattice(weights), _) => {
+        let stiffest = match (&body.families, &self.operator.weights) {
+            (Families::Lattice(families), BondWeights::Lattice(weights)) => {
                 families.offsets.iter().zip(weights).map(|(o, w)| self.law.tangent(o.length, *w)).sum::<f64>()
             }
-            (Families::Cloud(families), BondWeights::Cloud(weights), Arrangement::Scattered { positions, volumes }) => {
-                (0..positions.len())
-                    .map(|i| {
-                        let mut sum = 0.0;
-                        for bond in families.of(i) {
-                            let j = families.neighbours[bond] as usize;
-                            if j != i {
-                                let length = norm(&difference(&positions[j], &positions[i]));
-                                sum += self.law.tangent(length, weights.weight(bond, length, volumes[j]));
-                            }
-                        }
-                        sum
-                    })
-                    .fold(0.0, f64::max)
+            (Families::Cloud(_), weights) => {
+                let mut spring = vec![0.0; body.cloud.n_slots()];
+                let whole = BondStates::whole(body);
+                let kernel = Tangent(self.law);
+                Exec::default().sum_bonds::<D, 0, 1, Double>(body, weights, &whole, [], [&mut spring], &kernel);
+                spring.into_iter().fold(0.0, f64::max)
             }
             _ => unreachable!("weights are built on the families of their body"),
         };
@@ -172,6 +163,22 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, 1> for Energy<B> {
     #[inline(always)]
     fn add_small<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; D], strain: L, [sum]: [L; 1]) -> [L; 1] {
         [L::splat(0.5).mul_add(self.0.small_energy(bond, strain), sum)]
+    }
+}
+
+/// Σ k
+struct Tangent<L>(L);
+
+impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 1> for Tangent<B> {
+    const RELATIVE: bool = false;
+
+    #[inline(always)]
+    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
+        L::splat(0.0)
+    }
+    #[inline(always)]
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
+        [sum + self.0.tangent(bond.length, bond.weight)]
     }
 }
 
