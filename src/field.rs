@@ -153,6 +153,17 @@ pub struct Field {
     pub values: Values,
 }
 
+impl Field {
+    /// The value at one point: a field of one value.
+    pub fn at(&self, point: usize) -> Field {
+        let values = match &self.values {
+            Values::Scalar(values) => Values::Scalar(vec![values[point]]),
+            Values::Vector(values) => Values::Vector(vec![values[point]]),
+        };
+        Field { values, ..*self }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

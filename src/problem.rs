@@ -3,14 +3,19 @@
 //! It also keeps the books: work and impulse of everything from outside, energy lost to broken bonds and damping, so
 //! that a wrong run is seen at once.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use crate::conditions::prescribed::Step;
 use crate::conditions::{Load, Prescribed};
 use crate::error::{Error, NumericalStop, Result};
 use crate::execution::{Exec, Packs};
-use crate::family::{Body, BondLaw, BondStates};
+use crate::family::{Body, BondLaw, BondStates, Families};
 use crate::field::{Double, Field, Number, Precision, Values, components, components_mut, embed};
 use crate::geometry::Arrangement;
 use crate::physics::elasticity::{Elasticity, State};
+use crate::physics::failure::CriticalStretch;
 use crate::solver::{Clock, Stage, System, Unknowns, VelocityVerlet};
 
 /// One body, what it is made of, what acts on it, and where it stands.
@@ -21,7 +26,7 @@ pub struct Problem<const D: usize, L, P: Precision = Double> {
     pub prescribed: Vec<Prescribed>,
     pub loads: Vec<Load>,
     /// Σ β V′ over the family before any bond broke, by slot: what damage is measured against.
-    family_volume: Vec<f64>,
+    family_volume: Vec<P::Field>,
     /// Directed bonds of the body, and how many of them the pre-cracks cut.
     pub n_bonds: u64,
     pub n_cut: u64,
@@ -92,6 +97,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         let mut family_volume = vec![0.0; body.cloud.n_slots()];
         let n_bonds = state.states.count() + n_cut;
         physics.bonded_volume(&body, &mut exec, &BondStates::whole(&body), &mut family_volume);
+        let family_volume = family_volume.into_iter().map(P::Field::from_f64).collect();
         let ledger = Ledger::default();
         Problem { body, physics, state, prescribed, loads, family_volume, n_bonds, n_cut, exec, ledger, damping: 0.0 }
     }
@@ -272,40 +278,45 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         }
     }
 
-    /// φ at each point: 1 − Σ μ β V′ / Σ β V′; Shojaei et al. 2022, eq. (21).
-    pub fn damage(&mut self) -> Vec<f64> {
-        let mut now = vec![0.0; self.body.cloud.n_slots()];
-        self.physics.bonded_volume(&self.body, &mut self.exec, &self.state.states, &mut now);
-        self.body
-            .cloud
-            .slots
-            .iter()
-            .map(|&slot| {
-                let (now, whole) = (now[slot as usize], self.family_volume[slot as usize]);
-                if whole > 0.0 { 1.0 - now / whole } else { 0.0 }
-            })
-            .collect()
-    }
-
     /// A field by name, in point order; None if there is no such field.
     pub fn field(&mut self, name: &str) -> Option<Field> {
-        let slots = &self.body.cloud.slots;
+        self.field_of(name, 0..self.body.cloud.n_points())
+    }
+
+    /// The same at one point only: a field of one value.
+    pub fn field_at(&mut self, name: &str, point: usize) -> Option<Field> {
+        self.field_of(name, point..point + 1)
+    }
+
+    fn field_of(&mut self, name: &str, points: Range<usize>) -> Option<Field> {
+        let slots = &self.body.cloud.slots[points];
         let vector = |flat: &[P::Field]| {
             let parts = components::<D, _>(flat);
-            Values::Vector(
-                slots.iter().map(|&s| embed::<D>(&std::array::from_fn(|d| parts[d][s as usize].to_f64()))).collect(),
-            )
+            let at = |&slot: &u32| embed::<D>(&std::array::from_fn(|d| parts[d][slot as usize].to_f64()));
+            Values::Vector(slots.par_iter().map(at).collect())
+        };
+        let scalar = |value: &(dyn Fn(usize) -> f64 + Sync)| {
+            Values::Scalar(slots.par_iter().map(|&slot| value(slot as usize)).collect())
         };
         let (name, unit, values) = match name {
             "displacement" => ("displacement", "m", vector(&self.state.displacement)),
             "velocity" => ("velocity", "m/s", vector(&self.state.velocity)),
             "force" => ("force", "N/m³", vector(&self.state.force)),
-            "damage" => ("damage", "", Values::Scalar(self.damage())),
+            "damage" => {
+                // φ = 1 − Σ μ β V′ / Σ β V′; Shojaei et al. 2022, eq. (21).
+                let whole = &self.family_volume;
+                let mut now = vec![0.0; self.body.cloud.n_slots()];
+                self.physics.bonded_volume(&self.body, &mut self.exec, &self.state.states, &mut now);
+                let damage = |slot: usize| {
+                    let [now, whole] = [P::Field::from_f64(now[slot]), whole[slot]].map(P::Field::to_f64);
+                    if whole > 0.0 { 1.0 - now / whole } else { 0.0 }
+                };
+                ("damage", "", scalar(&damage))
+            }
             "strain_energy" => {
                 let mut density = vec![P::Field::default(); self.body.cloud.n_slots()];
                 self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
-                let slots = &self.body.cloud.slots;
-                ("strain_energy", "J/m³", Values::Scalar(slots.iter().map(|&s| density[s as usize].to_f64()).collect()))
+                ("strain_energy", "J/m³", scalar(&|slot| density[slot].to_f64()))
             }
             _ => return None,
         };
@@ -324,6 +335,29 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         }
         hasher.update(&self.state.states.bytes());
         hasher.finalize().to_hex().to_string()
+    }
+
+    /// Bytes that points, fields, bonds and the scratch of the loops take.
+    pub fn memory(&self) -> usize {
+        let cloud = &self.body.cloud;
+        let fields = (3 * D + 1) * size_of::<P::Field>() * cloud.n_slots() + size_of_val(&cloud.slots[..]);
+        let classes = self.physics.failure.as_ref().map_or(0, CriticalStretch::memory);
+        let points = match &cloud.arrangement {
+            Arrangement::Lattice(_) => 0,
+            Arrangement::Scattered { positions, volumes } => size_of_val(&positions[..]) + size_of_val(&volumes[..]),
+        };
+        let families = match &self.body.families {
+            Families::Lattice(families) => size_of_val(&families.blocks[..]),
+            // Sites in the precision of the loops, and the records of input values.
+            Families::Cloud(families) => {
+                let records = size_of_val(&families.sites.records[..]);
+                let fixed = if size_of::<P::Bond>() == 4 { records / 2 } else { 0 };
+                let input = 4 * size_of::<P::Field>() * cloud.n_slots();
+                size_of_val(&families.starts[..]) + size_of_val(&families.neighbours[..]) + records + fixed + input
+            }
+        };
+        let bonds = size_of_val(self.state.states.words()) + self.physics.operator.memory();
+        fields + classes + points + families + bonds
     }
 
     /// Broken pairs, pre-cracks not counted.

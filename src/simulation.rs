@@ -1,17 +1,23 @@
 //! The event loop: step, look, write, until the end. The first file to read.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
+
+use rayon::prelude::*;
 
 use crate::conditions::prescribed::Prescribed;
 use crate::error::{Error, Result};
 use crate::execution::Packs;
-use crate::family::{BondLaw, BondStates};
+use crate::family::BondLaw;
 use crate::field::{Double, Field, Precision, embed};
 use crate::geometry::Arrangement;
 use crate::output::history::History;
 use crate::output::report::{Energy, Report, Tip, WallSeconds, peak_memory};
-use crate::output::source::{Facts, Sizes, Source, Writer};
+use crate::output::snapshot::Look;
+use crate::output::source::{Facts, Points, Source};
+use crate::output::writer::{Order, Output};
+use crate::output::writer_thread::{Batch, WriterThread};
 use crate::problem::{Balance, Problem};
 use crate::solver::{Clock, VelocityVerlet};
 
@@ -29,7 +35,8 @@ pub struct Simulation {
     pub clock: Clock,
     pub n_steps: u64,
     pub history: History,
-    pub writers: Vec<Box<dyn Writer>>,
+    /// Until the run starts, which hands their writers to the writer thread.
+    pub outputs: Vec<Output>,
     pub folder: PathBuf,
     /// Threads of the pool that the run takes place in.
     pub threads: usize,
@@ -61,9 +68,9 @@ impl Simulation {
     /// the history and the report are written; a stop on numbers is then returned as the error it is.
     pub fn run(&mut self, mut observe: impl FnMut(&Progress) -> Wish) -> Result<Report> {
         let begin = Instant::now();
-        let mut output_seconds = 0.0;
         self.model.start();
-        self.write(false, &mut output_seconds)?;
+        let mut desk = self.desk()?;
+        self.write(&mut desk, false)?;
         let mut stop = None;
         let mut interrupted = false;
         while self.clock.step < self.n_steps {
@@ -71,21 +78,21 @@ impl Simulation {
                 stop = Some(error);
                 break;
             }
-            self.write(false, &mut output_seconds)?;
+            self.write(&mut desk, false)?;
             if observe(&self.progress(begin)) == Wish::Stop {
                 interrupted = self.clock.step < self.n_steps;
                 break;
             }
         }
-        self.write(true, &mut output_seconds)?;
+        self.write(&mut desk, true)?;
         let status = match (&stop, interrupted) {
             (Some(_), _) => "stopped",
             (None, true) => "interrupted",
             (None, false) => "done",
         };
-        let stepping = begin.elapsed().as_secs_f64() - output_seconds;
-        let wall = WallSeconds { setup: self.setup_seconds, stepping, output: output_seconds };
-        let report = self.report(status, wall);
+        let (output, writing) = desk.close()?;
+        let stepping = begin.elapsed().as_secs_f64() - output;
+        let report = self.report(status, WallSeconds { setup: self.setup_seconds, stepping, output, writing });
         report.write(&self.folder.join("report.json"))?;
         match stop {
             Some(error) => Err(error),
@@ -93,14 +100,35 @@ impl Simulation {
         }
     }
 
-    fn write(&mut self, last: bool, seconds: &mut f64) -> Result<()> {
+    /// Starts the writer thread.
+    fn desk(&mut self) -> Result<Desk> {
         let begin = Instant::now();
-        let model: &mut dyn Source = &mut *self.model;
-        self.history.write(model, &self.clock, last)?;
-        for writer in &mut self.writers {
-            writer.write(model, &self.clock, last)?;
+        let outputs = std::mem::take(&mut self.outputs).into_iter().map(Output::split);
+        let (orders, writers): (Vec<_>, Vec<_>) = outputs.unzip();
+        let history = self.history.table(&*self.model);
+        let thread = WriterThread::start(history, writers, self.threads, &self.folder)?;
+        Ok(Desk { orders, thread, seconds: begin.elapsed().as_secs_f64() })
+    }
+
+    /// Takes what is due of this instant and hands it to the writer thread.
+    fn write(&mut self, desk: &mut Desk, last: bool) -> Result<()> {
+        let begin = Instant::now();
+        let clock = self.clock;
+        let mut look = Look::new(&mut *self.model, clock);
+        let row = self.history.row(&mut look, &clock, last);
+        let due = desk
+            .orders
+            .iter_mut()
+            .enumerate()
+            .filter_map(|(k, order)| order.is_due(&clock, last).then_some((k, order)));
+        let snapshots = due.map(|(k, order)| (k, look.snapshot(&order.wants))).collect();
+        let batch = Batch { row, snapshots };
+        if batch.is_empty() {
+            desk.thread.check()?
+        } else {
+            desk.thread.hand(batch)?
         }
-        *seconds += begin.elapsed().as_secs_f64();
+        desk.seconds += begin.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -162,6 +190,23 @@ impl Simulation {
     }
 }
 
+/// Where the stepping thread and the writer thread meet.
+struct Desk {
+    orders: Vec<Order>,
+    thread: WriterThread,
+    /// That the stepping thread has spent here.
+    seconds: f64,
+}
+
+impl Desk {
+    /// Waits for the writer thread; seconds that the stepping thread spent on output, and that the writers were busy.
+    fn close(self) -> Result<(f64, f64)> {
+        let begin = Instant::now();
+        let writing = self.thread.finish()?;
+        Ok((self.seconds + begin.elapsed().as_secs_f64(), writing))
+    }
+}
+
 /// Makes an output folder, refusing one that holds anything unless `overwrite`, which removes what a run writes.
 pub fn prepare_folder(folder: &Path, overwrite: bool) -> Result<()> {
     if let Ok(mut entries) = std::fs::read_dir(folder)
@@ -195,27 +240,14 @@ pub fn prepare_folder(folder: &Path, overwrite: bool) -> Result<()> {
 pub struct Model<const D: usize, L, P: Precision = Double> {
     pub problem: Problem<D, L, P>,
     facts: Facts,
-    positions: Vec<[f64; 3]>,
-    sizes: Vec<f64>,
+    /// Made when a writer first asks.
+    points: OnceLock<Arc<Points>>,
 }
 
 impl<const D: usize, L: BondLaw<D>, P: Packs> Model<D, L, P> {
     /// `facts` as far as the case knows them; counts and sizes are filled in from the problem.
     pub fn new(problem: Problem<D, L, P>, facts: Facts) -> Self {
         let cloud = &problem.body.cloud;
-        let positions: Vec<[f64; 3]> = cloud.slots.iter().map(|&s| embed(&cloud.position(s as usize))).collect();
-        let sizes = match &cloud.arrangement {
-            Arrangement::Lattice(_) => Vec::new(),
-            Arrangement::Scattered { volumes, .. } => {
-                cloud.slots.iter().map(|&s| volumes[s as usize].powf(1.0 / D as f64)).collect()
-            }
-        };
-        let state_bytes = match &problem.state.states {
-            BondStates::Lattice(words) => 2 * words.len(),
-            BondStates::Cloud(bytes) => (2 + 4 * crate::family::GROUP) * bytes.len(),
-        };
-        let fields = (3 * D + 1) * 8 * cloud.n_slots() + 28 * cloud.n_points();
-        let memory = (state_bytes + fields + problem.physics.operator.memory()) as u64;
         let facts = Facts {
             dimension: D,
             points: cloud.n_points(),
@@ -223,25 +255,35 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Model<D, L, P> {
             cut_bonds: problem.n_cut,
             horizon: problem.body.horizon,
             spacing: cloud.spacing,
-            memory,
+            memory: problem.memory() as u64,
             ..facts
         };
-        Model { problem, facts, positions, sizes }
+        Model { problem, facts, points: OnceLock::new() }
     }
 }
 
 impl<const D: usize, L: BondLaw<D>, P: Packs> Source for Model<D, L, P> {
-    fn positions(&self) -> &[[f64; 3]] {
-        &self.positions
-    }
-    fn sizes(&self) -> Sizes<'_> {
-        if self.sizes.is_empty() { Sizes::Same(self.facts.spacing) } else { Sizes::Each(&self.sizes) }
-    }
     fn facts(&self) -> &Facts {
         &self.facts
     }
+    fn points(&self) -> &Arc<Points> {
+        self.points.get_or_init(|| {
+            let cloud = &self.problem.body.cloud;
+            let positions = cloud.slots.par_iter().map(|&s| embed(&cloud.position(s as usize))).collect();
+            let sizes = match &cloud.arrangement {
+                Arrangement::Lattice(_) => Vec::new(),
+                Arrangement::Scattered { volumes, .. } => {
+                    cloud.slots.iter().map(|&s| volumes[s as usize].powf(1.0 / D as f64)).collect()
+                }
+            };
+            Arc::new(Points { positions, sizes, facts: self.facts.clone() })
+        })
+    }
     fn field(&mut self, name: &str) -> Option<Field> {
         self.problem.field(name)
+    }
+    fn field_at(&mut self, name: &str, point: usize) -> Option<Field> {
+        self.problem.field_at(name, point)
     }
     fn balance(&mut self) -> Balance {
         self.problem.balance()
@@ -266,5 +308,180 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Stepper for Model<D, L, P> {
     }
     fn step(&mut self, solver: &VelocityVerlet, clock: &mut Clock) -> Result<()> {
         self.problem.step(solver, clock)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::NumericalStop;
+    use crate::field::Values;
+    use crate::output::schedule::Schedule;
+    use crate::output::snapshot::{Snapshot, Wants};
+    use crate::output::writer::Writer;
+    use std::sync::Mutex;
+
+    /// A model that does nothing until it stops on numbers, and counts how often its field is computed.
+    struct Still {
+        points: Arc<Points>,
+        stops_at: u64,
+        computed: u64,
+    }
+
+    impl Source for Still {
+        fn facts(&self) -> &Facts {
+            &self.points().facts
+        }
+        fn points(&self) -> &Arc<Points> {
+            &self.points
+        }
+        fn field(&mut self, name: &str) -> Option<Field> {
+            self.computed += 1;
+            let values = Values::Scalar(vec![self.computed as f64; 1 << 17]);
+            (name == "damage").then_some(Field { name: "damage", unit: "", values })
+        }
+        fn field_at(&mut self, name: &str, point: usize) -> Option<Field> {
+            self.field(name).map(|field| field.at(point))
+        }
+        fn balance(&mut self) -> Balance {
+            Balance::default()
+        }
+        fn broken_pairs(&self) -> u64 {
+            0
+        }
+        fn reactions(&self) -> Vec<(String, f64)> {
+            Vec::new()
+        }
+        fn hash(&self) -> String {
+            String::new()
+        }
+        fn family_sizes(&self) -> Vec<u32> {
+            Vec::new()
+        }
+    }
+
+    impl Stepper for Still {
+        fn start(&mut self) {}
+        fn step(&mut self, _: &VelocityVerlet, clock: &mut Clock) -> Result<()> {
+            clock.step += 1;
+            let (step, time) = (clock.step, clock.time());
+            let stop = NumericalStop { step, time, field: "velocity", value: f64::NAN, point: None, cause: "".into() };
+            if step == self.stops_at { Err(Error::Numbers(Box::new(stop))) } else { Ok(()) }
+        }
+    }
+
+    /// Steps at which it wrote, and the value of the field then; slow, and fails at one of the steps.
+    struct Slow {
+        seen: Arc<Mutex<Vec<(u64, f64)>>>,
+        fails_at: u64,
+        folder: PathBuf,
+    }
+
+    impl Writer for Slow {
+        fn wants(&self) -> Wants {
+            Wants { fields: vec!["damage"], point: None }
+        }
+        fn write(&mut self, snapshot: &Snapshot) -> Result<()> {
+            std::thread::sleep(std::time::Duration::from_millis(3));
+            let Some(Values::Scalar(values)) = snapshot.field("damage").map(|field| &field.values) else {
+                panic!("the snapshot holds what was wanted")
+            };
+            if let Ok(mut seen) = self.seen.lock() {
+                seen.push((snapshot.clock.step, values[0]));
+            }
+            if snapshot.clock.step == self.fails_at {
+                return Err(Error::io(&self.folder, std::io::Error::other("disk full")));
+            }
+            Ok(())
+        }
+    }
+
+    type Seen = Arc<Mutex<Vec<(u64, f64)>>>;
+
+    /// Two writers of the same field, every 2 and every 3 of 20 steps.
+    fn simulation(name: &str, stops_at: u64, fails_at: u64) -> (Simulation, [Seen; 2]) {
+        let folder = std::env::temp_dir().join(format!("bondwise-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let facts = Facts {
+            dimension: 1,
+            points: 1,
+            bonds: 0,
+            cut_bonds: 0,
+            horizon: 1.0,
+            spacing: 1.0,
+            stable_step: 1.0,
+            bar_speed: 1.0,
+            rayleigh_speed: None,
+            micromodulus: 1.0,
+            critical_stretch: None,
+            memory: 0,
+        };
+        let points = Arc::new(Points { positions: vec![[0.0; 3]], sizes: Vec::new(), facts });
+        let seen = [Seen::default(), Seen::default()];
+        let output = |every: u64, seen: &Seen| Output {
+            schedule: Schedule::Steps(every),
+            writer: Box::new(Slow { seen: seen.clone(), fails_at, folder: folder.clone() }),
+        };
+        let simulation = Simulation {
+            title: String::new(),
+            model: Box::new(Still { points, stops_at, computed: 0 }),
+            solver: VelocityVerlet { damping: 0.0 },
+            clock: Clock { step: 0, dt: 1.0 },
+            n_steps: 20,
+            history: History::new(folder.join("history.csv"), 5, None),
+            outputs: vec![output(2, &seen[0]), output(3, &seen[1])],
+            folder,
+            threads: 1,
+            setup_seconds: 0.0,
+        };
+        (simulation, seen)
+    }
+
+    fn steps(seen: &Seen) -> Vec<u64> {
+        seen.lock().unwrap().iter().map(|(step, _)| *step).collect()
+    }
+
+    #[test]
+    fn every_due_instant_is_written_in_order_and_its_field_computed_once() {
+        let (mut simulation, seen) = simulation("order", 0, u64::MAX);
+        let report = simulation.run(|_| Wish::Continue).unwrap();
+        assert_eq!(steps(&seen[0]), (0..=10).map(|k| 2 * k).collect::<Vec<_>>());
+        assert_eq!(steps(&seen[1]), [0, 3, 6, 9, 12, 15, 18, 20]);
+        let mut all: Vec<_> = seen.iter().flat_map(|seen| seen.lock().unwrap().clone()).collect();
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all.dedup();
+        // Equal instants gave equal values, and the values count the computations.
+        assert_eq!(
+            all.iter().map(|(_, value)| *value).collect::<Vec<_>>(),
+            (1..=15).map(f64::from).collect::<Vec<_>>()
+        );
+        assert!(report.wall_seconds.writing >= 19.0 * 3e-3, "{:?}", report.wall_seconds);
+    }
+
+    #[test]
+    fn a_stop_on_numbers_and_a_wish_to_stop_still_write_the_last_instant_and_the_report() {
+        for (name, stops_at, wish) in [("numbers", 7, Wish::Continue), ("wish", 0, Wish::Stop)] {
+            let (mut simulation, seen) = simulation(name, stops_at, u64::MAX);
+            let ended = simulation.run(|progress| if progress.step == 7 { wish } else { Wish::Continue });
+            assert_eq!(steps(&seen[0]), [0, 2, 4, 6, 7], "{name}");
+            assert_eq!(steps(&seen[1]), [0, 3, 6, 7], "{name}");
+            assert!(simulation.folder.join("report.json").is_file());
+            let history = std::fs::read_to_string(simulation.folder.join("history.csv")).unwrap();
+            assert_eq!(history.lines().count(), 1 + 3, "{history}");
+            assert_eq!(ended.is_err(), stops_at > 0);
+        }
+    }
+
+    #[test]
+    fn the_error_of_a_writer_ends_the_run() {
+        // Of a writer in the middle of the run, and of one that fails on the last frame of a run that the numbers end.
+        for (name, stops_at, fails_at, before) in [("middle", 0, 6, 3), ("last", 7, 7, 6)] {
+            let (mut simulation, seen) = simulation(name, stops_at, fails_at);
+            let error = simulation.run(|_| Wish::Continue).unwrap_err();
+            assert!(matches!(error, Error::Io { .. }) && error.to_string().ends_with(": disk full"), "{error}");
+            assert_eq!(steps(&seen[0]).last(), Some(&fails_at));
+            assert_eq!(steps(&seen[1]).last(), Some(&before), "what comes after the error is not written");
+            assert!(!simulation.folder.join("report.json").exists());
+        }
     }
 }

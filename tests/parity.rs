@@ -343,7 +343,9 @@ fn a_run_does_not_depend_on_the_order_of_the_points() {
     assert_eq!(a.model.broken_pairs(), b.model.broken_pairs());
     assert_eq!((a.model.facts().bonds, a.model.facts().cut_bonds), (b.model.facts().bonds, b.model.facts().cut_bonds));
     let (bonds_a, bonds_b) = (a.model.family_sizes(), b.model.family_sizes());
-    let (Sizes::Each(sizes_a), Sizes::Each(sizes_b)) = (a.model.sizes(), b.model.sizes()) else { panic!("a cloud") };
+    let (Sizes::Each(sizes_a), Sizes::Each(sizes_b)) = (a.model.points().sizes(), b.model.points().sizes()) else {
+        panic!("a cloud")
+    };
     for (k, &point) in shuffled.iter().enumerate() {
         assert_eq!(a.model.positions()[point], b.model.positions()[k]);
         assert_eq!(sizes_a[point], sizes_b[k]);

@@ -9,6 +9,7 @@ use bondwise::execution::Exec;
 use bondwise::field::components_mut;
 use bondwise::geometry::{Cloud, Shape};
 use bondwise::physics::Elasticity;
+use bondwise::physics::elasticity::State;
 use bondwise::physics::elasticity::bond_based::BondBased;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -46,7 +47,7 @@ fn set_up(rule: PartialVolume, mut positions: Vec<[f64; 3]>, shuffle: bool) {
     let body = timed("families", || standard::body(cloud, 3.015, rule));
     let operator = timed("weights", || Operator::standard(&body, 1.0, Influence::Constant, rule));
     let physics = Elasticity { law: BondBased, density: 1.0, operator, failure: None };
-    let mut state = timed("states", || physics.initial_state(&body));
+    let mut state: State = timed("states", || physics.initial_state(&body));
     std::hint::black_box(timed("stable step", || physics.stable_step(&body)));
     let mut exec = Exec::default();
     for slot in 0..body.cloud.n_slots() {

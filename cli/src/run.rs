@@ -105,10 +105,12 @@ fn summary(report: &Report, folder: &Path) {
     }
     let w = &report.wall_seconds;
     say!(
-        "time: setup {:.2} s, stepping {:.2} s, output {:.2} s; {:.3e} bond updates per second",
+        "time: setup {:.2} s, stepping {:.2} s, output {:.2} s (beside them, writing {:.2} s); {:.3e} bond updates per \
+         second",
         w.setup,
         w.stepping,
         w.output,
+        w.writing,
         report.bond_updates_per_second
     );
     say!("state hash: {}", report.state_hash);

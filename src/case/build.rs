@@ -34,7 +34,8 @@ use crate::output::picture::{ColorMap, Picture, View};
 use crate::output::pictures::Pictures;
 use crate::output::probe::Probe;
 use crate::output::schedule::Schedule;
-use crate::output::source::{Facts, Writer};
+use crate::output::source::Facts;
+use crate::output::writer::Output as Written;
 use crate::physics::Elasticity;
 use crate::physics::elasticity::bond_based;
 use crate::physics::elasticity::moduli::{self, Hypothesis};
@@ -223,7 +224,7 @@ impl<const D: usize> Builder<'_, D> {
         }
         let n_steps = n_steps as u64;
         let folder = &self.options.folder;
-        let mut writers: Vec<Box<dyn Writer>> = Vec::new();
+        let mut outputs = Vec::new();
         let mut every = HISTORY_EVERY;
         let mut tip = self.default_tip(&facts);
         for (k, output) in case.output.iter().enumerate() {
@@ -232,21 +233,24 @@ impl<const D: usize> Builder<'_, D> {
                     let schedule = schedule(vtu.every, vtu.every_steps, &[]);
                     self.files(&schedule, n_steps, dt, &format!("output[{k}].vtu"))?;
                     let fields = names(&vtu.fields, &[FieldName::Displacement, FieldName::Damage]);
-                    writers.push(Box::new(Frames::new(folder, schedule, fields)));
+                    outputs.push(Written { schedule, writer: Box::new(Frames::new(folder, fields)) });
                 }
                 Output::Picture(picture) => {
-                    let schedule = schedule(picture.every, picture.every_steps, &picture.at);
+                    // One that does not say when is drawn at the end only.
+                    let schedule = match schedule(picture.every, picture.every_steps, &picture.at) {
+                        Schedule::Ends => Schedule::End,
+                        other => other,
+                    };
                     self.files(&schedule, n_steps, dt, &format!("output[{k}].picture"))?;
-                    writers.push(Box::new(Pictures {
+                    let pictures = Pictures {
                         folder: folder.clone(),
-                        schedule,
                         field: name(picture.field),
                         component: picture.component,
                         deform: picture.deform,
                         above: picture.above,
                         style: style(picture, &case.case.title),
-                        last_step: None,
-                    }));
+                    };
+                    outputs.push(Written { schedule, writer: Box::new(pictures) });
                 }
                 Output::History(history) => every = history.every_steps,
                 Output::Probe(probe) => {
@@ -254,7 +258,9 @@ impl<const D: usize> Builder<'_, D> {
                     let path = folder.join(format!("probe_{}.csv", probe.name));
                     let mut at = [0.0; 3];
                     at[..D].copy_from_slice(&probe.at);
-                    writers.push(Box::new(Probe::new(path, at, probe.every_steps, fields)));
+                    let schedule = Schedule::Steps(probe.every_steps);
+                    outputs
+                        .push(Written { schedule, writer: Box::new(Probe::new(path, model.positions(), at, fields)) });
                 }
                 Output::CrackTip(t) => {
                     let mut along = [0.0; 3];
@@ -270,7 +276,7 @@ impl<const D: usize> Builder<'_, D> {
             clock: Clock { step: 0, dt },
             n_steps,
             history: History::new(folder.join("history.csv"), every, tip),
-            writers,
+            outputs,
             folder: folder.clone(),
             threads: rayon::current_num_threads(),
             setup_seconds: 0.0,

@@ -2,36 +2,36 @@
 
 use std::path::{Path, PathBuf};
 
-use super::schedule::Schedule;
-use super::source::{Source, Writer};
-use super::vtu::{FieldData, Precision, write_pvd, write_vtu};
+use super::snapshot::{Snapshot, Wants};
+use super::vtu::{FieldData, Grid, Precision, write_pvd, write_vtu};
+use super::writer::Writer;
 use crate::error::{Error, Result};
 use crate::field::Values;
-use crate::solver::Clock;
 
 /// Writes `frames/frame_<step>.vtu` and `fields.pvd`.
 pub struct Frames {
     folder: PathBuf,
-    schedule: Schedule,
     fields: Vec<&'static str>,
+    /// What all frames share, packed for the first.
+    grid: Option<Grid>,
     written: Vec<(f64, String)>,
 }
 
 impl Frames {
-    pub fn new(folder: &Path, schedule: Schedule, fields: Vec<&'static str>) -> Self {
-        Frames { folder: folder.to_path_buf(), schedule, fields, written: Vec::new() }
+    pub fn new(folder: &Path, fields: Vec<&'static str>) -> Self {
+        Frames { folder: folder.to_path_buf(), fields, grid: None, written: Vec::new() }
     }
 }
 
 impl Writer for Frames {
-    fn write(&mut self, source: &mut dyn Source, clock: &Clock, last: bool) -> Result<()> {
-        let name = format!("frames/frame_{:08}.vtu", clock.step);
-        let already = self.written.last().is_some_and(|(_, n)| *n == name);
-        if already || !(last || self.schedule.is_due(clock)) {
-            return Ok(());
-        }
-        let values: Vec<_> = self.fields.iter().filter_map(|f| source.field(f)).collect();
-        let data: Vec<_> = values
+    fn wants(&self) -> Wants {
+        Wants { fields: self.fields.clone(), point: None }
+    }
+
+    fn write(&mut self, snapshot: &Snapshot) -> Result<()> {
+        let name = format!("frames/frame_{:08}.vtu", snapshot.clock.step);
+        let data: Vec<_> = snapshot
+            .fields
             .iter()
             .map(|field| match &field.values {
                 Values::Scalar(v) => (field.name, FieldData::Scalar(v)),
@@ -42,9 +42,10 @@ impl Writer for Frames {
         if let Some(parent) = path.parent() {
             std::fs::create_dir_all(parent).map_err(|e| Error::io(parent, e))?;
         }
-        write_vtu(&path, source.positions(), &data, clock.time(), Precision::Float64)
-            .map_err(|e| Error::io(&path, e))?;
-        self.written.push((clock.time(), name));
+        let time = snapshot.clock.time();
+        let grid = self.grid.get_or_insert_with(|| Grid::new(&snapshot.points.positions, Precision::Float64));
+        write_vtu(&path, grid, &data, time).map_err(|e| Error::io(&path, e))?;
+        self.written.push((time, name));
         let pvd = self.folder.join("fields.pvd");
         write_pvd(&pvd, &self.written).map_err(|e| Error::io(&pvd, e))
     }

@@ -1,19 +1,22 @@
 //! The history of a run: energies, momenta, broken bonds, crack tip and reactions, a row at a time.
+//!
+//! The rows are made on the stepping thread, which alone has the forces; what puts them into the file is a
+//! [`Table`] like any other.
 
 use std::path::PathBuf;
 
 use super::crack_tip::CrackTip;
+use super::snapshot::Look;
 use super::source::Source;
 use super::table::Table;
-use crate::error::Result;
+use crate::field::Values;
 use crate::problem::Balance;
 use crate::solver::Clock;
 
-/// Writes `history.csv` and keeps the extremes that the report needs.
+/// Makes the rows of `history.csv` and keeps the extremes that the report needs.
 pub struct History {
     path: PathBuf,
     every: u64,
-    table: Option<Table>,
     last_step: Option<u64>,
     pub tip: Option<CrackTip>,
     pub balance: Balance,
@@ -28,7 +31,6 @@ impl History {
         History {
             path,
             every,
-            table: None,
             last_step: None,
             tip,
             balance: Balance::default(),
@@ -49,40 +51,45 @@ impl History {
         if self.largest_momentum_scale > 0.0 { self.largest_momentum_defect / self.largest_momentum_scale } else { 0.0 }
     }
 
-    /// Adds a row if one is due.
-    pub fn write(&mut self, source: &mut dyn Source, clock: &Clock, last: bool) -> Result<()> {
+    /// The table that the rows go into.
+    pub fn table(&self, source: &dyn Source) -> Table {
+        let dimension = source.facts().dimension;
+        let axes = &["x", "y", "z"][..dimension];
+        let mut columns: Vec<String> =
+            ["step", "time", "kinetic", "strain", "fracture", "external", "damped", "imbalance", "broken_bonds"]
+                .map(String::from)
+                .into();
+        columns.extend(axes.iter().map(|a| format!("momentum_{a}")));
+        // About z in 2D; none in 1D.
+        columns.extend(["x", "y", "z"][angular(dimension)].iter().map(|a| format!("angular_momentum_{a}")));
+        if self.tip.is_some() {
+            columns.extend(axes.iter().map(|a| format!("crack_tip_{a}")));
+            columns.push("crack_tip_speed".into());
+        }
+        columns.extend(source.reactions().iter().map(|(name, _)| format!("reaction_{name}")));
+        Table::new(&self.path, columns)
+    }
+
+    /// A row if one is due.
+    pub fn row(&mut self, look: &mut Look<'_>, clock: &Clock, last: bool) -> Option<Vec<f64>> {
         let due = last || clock.step.is_multiple_of(self.every);
         if !due || self.last_step == Some(clock.step) {
-            return Ok(());
+            return None;
         }
         self.last_step = Some(clock.step);
-        let b = source.balance();
+        let b = look.source.balance();
         self.balance = b;
         self.largest_defect = self.largest_defect.max(b.defect().abs());
         self.largest_scale = self.largest_scale.max(b.scale());
         self.largest_momentum_defect = self.largest_momentum_defect.max(b.momentum_defect);
         self.largest_momentum_scale = self.largest_momentum_scale.max(b.momentum_scale);
-        if let Some(tip) = &mut self.tip {
-            tip.follow(source, clock.time());
+        if let Some(tip) = &mut self.tip
+            && let Some(damage) = look.field("damage")
+            && let Values::Scalar(damage) = &damage.values
+        {
+            tip.look(look.source.positions(), damage, clock.time());
         }
-        let reactions = source.reactions();
-        let dimension = source.facts().dimension;
-        let axes = &["x", "y", "z"][..dimension];
-        if self.table.is_none() {
-            let mut columns: Vec<String> =
-                ["step", "time", "kinetic", "strain", "fracture", "external", "damped", "imbalance", "broken_bonds"]
-                    .map(String::from)
-                    .into();
-            columns.extend(axes.iter().map(|a| format!("momentum_{a}")));
-            // About z in 2D; none in 1D.
-            columns.extend(["x", "y", "z"][angular(dimension)].iter().map(|a| format!("angular_momentum_{a}")));
-            if self.tip.is_some() {
-                columns.extend(axes.iter().map(|a| format!("crack_tip_{a}")));
-                columns.push("crack_tip_speed".into());
-            }
-            columns.extend(reactions.iter().map(|(name, _)| format!("reaction_{name}")));
-            self.table = Some(Table::create(&self.path, &columns)?);
-        }
+        let dimension = look.source.facts().dimension;
         let relative = if b.scale() > 0.0 { b.defect() / b.scale() } else { 0.0 };
         let mut row = vec![
             clock.step as f64,
@@ -93,7 +100,7 @@ impl History {
             b.external,
             b.damped,
             relative,
-            source.broken_pairs() as f64,
+            look.source.broken_pairs() as f64,
         ];
         row.extend(&b.momentum[..dimension]);
         row.extend(&b.angular_momentum[angular(dimension)]);
@@ -101,8 +108,8 @@ impl History {
             row.extend(&tip.position.unwrap_or([f64::NAN; 3])[..dimension]);
             row.push(tip.speed);
         }
-        row.extend(reactions.iter().map(|(_, value)| value));
-        self.table.as_mut().map_or(Ok(()), |table| table.row(&row))
+        row.extend(look.source.reactions().iter().map(|(_, value)| value));
+        Some(row)
     }
 }
 

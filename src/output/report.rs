@@ -51,12 +51,15 @@ pub struct Report {
     pub state_hash: String,
 }
 
-/// Where the time went.
+/// Where the time went. The first three follow each other; writing goes on beside them.
 #[derive(Debug, Clone, Copy, Serialize, PartialEq, Default)]
 pub struct WallSeconds {
     pub setup: f64,
     pub stepping: f64,
+    /// In which the run did not step: history rows, snapshots, waiting for the writer thread.
     pub output: f64,
+    /// In which the writer thread was busy.
+    pub writing: f64,
 }
 
 /// Energies at the end, J (2D: J/m).

@@ -13,10 +13,12 @@ pub enum Schedule {
     At(Vec<f64>),
     /// The first and the last instant only.
     Ends,
+    /// The last instant only.
+    End,
 }
 
 impl Schedule {
-    /// Whether it is due at this clock, having been asked at every step before.
+    /// Whether it is due at this clock, having been asked at every step before. At the last instant all are.
     pub fn is_due(&self, clock: &Clock) -> bool {
         // A step belongs to the instant that it is nearest to from above, up to rounding of the product step × Δt.
         let slack = 1e-6 * clock.dt;
@@ -26,6 +28,7 @@ impl Schedule {
             Schedule::Every(period) => (now / period).floor() > (before / period).floor(),
             Schedule::At(times) => times.iter().any(|&t| t <= now && t > before),
             Schedule::Ends => clock.step == 0,
+            Schedule::End => false,
         }
     }
 
@@ -35,7 +38,7 @@ impl Schedule {
             Schedule::Steps(n) => steps / n + 1,
             Schedule::Every(period) => ((steps as f64 * dt / period) as u64 + 1).min(steps + 1),
             Schedule::At(times) => times.len() as u64,
-            Schedule::Ends => 1,
+            Schedule::Ends | Schedule::End => 1,
         }
     }
 }

@@ -1,19 +1,26 @@
-//! What writers may see of a run: numbers about the body, and fields by name at one instant.
+//! What outputs may see of a run: numbers about the body, and fields by name at one instant.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
 
 use crate::field::{Field, Values};
 use crate::problem::Balance;
-use crate::solver::Clock;
 
-/// A model that writers look at. Asking for a field may compute it, hence the `&mut`.
+/// A model that outputs look at. Asking for a field may compute it, hence the `&mut`.
 pub trait Source {
+    /// What does not change, shared with whoever looks at it later.
+    fn points(&self) -> &Arc<Points>;
     /// Reference positions in point order, m; zeros beyond the dimension.
-    fn positions(&self) -> &[[f64; 3]];
-    /// Side of the cell of each point, m: one for all on a lattice.
-    fn sizes(&self) -> Sizes<'_>;
+    fn positions(&self) -> &[[f64; 3]] {
+        &self.points().positions
+    }
     /// Facts that do not change.
     fn facts(&self) -> &Facts;
     /// A field by name, in point order; None if the model has no such field.
     fn field(&mut self, name: &str) -> Option<Field>;
+    /// The same at one point only: a field of one value.
+    fn field_at(&mut self, name: &str, point: usize) -> Option<Field>;
     fn balance(&mut self) -> Balance;
     fn broken_pairs(&self) -> u64;
     /// Name and value (N) of the reaction of each prescribed set.
@@ -24,6 +31,23 @@ pub trait Source {
 }
 
 pub use super::picture::Sizes;
+
+/// The points of a body. They never move, so that snapshots share them instead of copying.
+#[derive(Debug)]
+pub struct Points {
+    /// Reference positions in point order, m; zeros beyond the dimension.
+    pub positions: Vec<[f64; 3]>,
+    /// Side of the cell of each point, m; empty on a lattice, where it is the spacing.
+    pub sizes: Vec<f64>,
+    pub facts: Facts,
+}
+
+impl Points {
+    /// Side of the cell of each point, m: one for all on a lattice.
+    pub fn sizes(&self) -> Sizes<'_> {
+        if self.sizes.is_empty() { Sizes::Same(self.facts.spacing) } else { Sizes::Each(&self.sizes) }
+    }
+}
 
 /// What is known of a body before the first step.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,32 +74,35 @@ pub struct Facts {
     pub memory: u64,
 }
 
-/// Writes something at its own times.
-pub trait Writer: Send {
-    /// Called after every step, and before the first; `last` at the end of the run.
-    fn write(&mut self, source: &mut dyn Source, clock: &Clock, last: bool) -> crate::Result<()>;
-}
-
 /// Where the material points are now: reference positions plus `factor` times the displacement, m.
 pub fn deformed(source: &mut dyn Source, factor: f64) -> Vec<[f64; 3]> {
-    let mut positions = source.positions().to_vec();
-    if factor != 0.0
-        && let Some(Field { values: Values::Vector(u), .. }) = source.field("displacement")
-    {
-        for (x, u) in positions.iter_mut().zip(u) {
-            for d in 0..3 {
-                x[d] += factor * u[d];
-            }
+    let displacement = if factor == 0.0 { None } else { source.field("displacement") };
+    moved(source.positions(), displacement.as_ref(), factor)
+}
+
+/// Positions plus `factor` times a displacement, m; the positions if there is none.
+pub fn moved(positions: &[[f64; 3]], displacement: Option<&Field>, factor: f64) -> Vec<[f64; 3]> {
+    match displacement {
+        Some(Field { values: Values::Vector(u), .. }) if factor != 0.0 => {
+            let moved = |(x, u): (&[f64; 3], &[f64; 3])| std::array::from_fn(|d| x[d] + factor * u[d]);
+            positions.par_iter().zip(u).map(moved).collect()
         }
+        _ => positions.to_vec(),
     }
-    positions
 }
 
 /// One component of a field, or the magnitude of a vector when none is named.
 pub fn scalar(field: Field, component: Option<usize>) -> Vec<f64> {
-    match (field.values, component) {
-        (Values::Scalar(values), _) => values,
-        (Values::Vector(values), Some(c)) => values.iter().map(|v| v[c]).collect(),
-        (Values::Vector(values), None) => values.iter().map(crate::field::norm).collect(),
+    match field.values {
+        Values::Scalar(values) => values,
+        Values::Vector(values) => component_of(&values, component),
+    }
+}
+
+/// One component of vectors, or their magnitudes when none is named.
+pub fn component_of(values: &[[f64; 3]], component: Option<usize>) -> Vec<f64> {
+    match component {
+        Some(c) => values.par_iter().map(|v| v[c]).collect(),
+        None => values.par_iter().map(crate::field::norm).collect(),
     }
 }

@@ -9,25 +9,31 @@ use crate::error::{Error, Result};
 /// A CSV file of numbers.
 pub struct Table {
     path: PathBuf,
-    file: BufWriter<File>,
+    columns: Vec<String>,
+    /// Opened when the first row comes.
+    file: Option<BufWriter<File>>,
 }
 
 impl Table {
-    pub fn create(path: &Path, columns: &[String]) -> Result<Self> {
-        let file = File::create(path).map_err(|e| Error::io(path, e))?;
-        let mut table = Table { path: path.to_path_buf(), file: BufWriter::new(file) };
-        table.line(&columns.join(","))?;
-        Ok(table)
+    pub fn new(path: &Path, columns: Vec<String>) -> Self {
+        Table { path: path.to_path_buf(), columns, file: None }
     }
 
     /// Numbers in the shortest form that reads back to the same bits; not-a-number as an empty cell.
     pub fn row(&mut self, values: &[f64]) -> Result<()> {
         let cells: Vec<String> =
             values.iter().map(|v| if v.is_nan() { String::new() } else { format!("{v:e}") }).collect();
-        self.line(&cells.join(","))
-    }
-
-    fn line(&mut self, line: &str) -> Result<()> {
-        writeln!(self.file, "{line}").and_then(|()| self.file.flush()).map_err(|e| Error::io(&self.path, e))
+        let write = |file: &mut BufWriter<File>, cells: &[String]| writeln!(file, "{}", cells.join(","));
+        let written = match &mut self.file {
+            Some(file) => write(file, &cells).and_then(|()| file.flush()),
+            None => File::create(&self.path).map(BufWriter::new).and_then(|mut file| {
+                write(&mut file, &self.columns)?;
+                write(&mut file, &cells)?;
+                file.flush()?;
+                self.file = Some(file);
+                Ok(())
+            }),
+        };
+        written.map_err(|e| Error::io(&self.path, e))
     }
 }

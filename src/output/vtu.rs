@@ -2,8 +2,9 @@
 //!
 //! A frame is an unstructured grid (`.vtu`) with one vertex cell per point, so
 //! that filters which work on cells see the points too. Its arrays stand after
-//! the XML as raw bytes, compressed in blocks that are packed in parallel. A
-//! series of frames is a `.pvd` file that lists their times and names.
+//! the XML as raw bytes, compressed in blocks that are packed in parallel; those
+//! that all frames of a cloud share are packed once. A series of frames is a
+//! `.pvd` file that lists their times and names.
 //!
 //! Absent on purpose: other cell types, several pieces in one file, and reading;
 //! a run is continued from its checkpoint, not from its pictures.
@@ -38,23 +39,51 @@ pub enum Precision {
     Float64,
 }
 
+/// What all frames of one cloud share: its points and cells, compressed.
+pub struct Grid {
+    count: usize,
+    precision: Precision,
+    points: Packed,
+    connectivity: Packed,
+    offsets: Packed,
+    types: Packed,
+}
+
+impl Grid {
+    /// * `positions`: coordinates \[m\]; in one and two dimensions the rest is zero.
+    /// * `precision`: of these and of the fields.
+    pub fn new(positions: &[[f64; 3]], precision: Precision) -> Self {
+        const VERTEX: u8 = 1; // VTK's number of the cell type
+        let count = positions.len();
+        Self {
+            count,
+            precision,
+            points: reals(positions.as_flattened(), precision),
+            connectivity: integers(count, |i| i as i64),
+            offsets: integers(count, |i| i as i64 + 1),
+            types: Packed::new(count, 1, |range, bytes| bytes.extend(range.map(|_| VERTEX))),
+        }
+    }
+}
+
 /// Writes a point cloud with its fields as `.vtu`.
 ///
-/// * `positions`: coordinates \[m\]; in one and two dimensions the rest is zero.
-/// * `fields`: name and values; each as long as `positions`.
+/// * `fields`: name and values; each as long as the cloud.
 /// * `time`: \[s\], stored as field data `TimeValue`, where ParaView looks for it.
 ///
 /// The file appears under its name only when it is complete. A field of the
 /// wrong length, or two fields of one name, are `InvalidInput`.
-pub fn write_vtu(
-    path: &Path,
-    positions: &[[f64; 3]],
-    fields: &[(&str, FieldData<'_>)],
-    time: f64,
-    precision: Precision,
-) -> io::Result<()> {
-    check(positions.len(), fields).map_err(|reason| named(path, io::ErrorKind::InvalidInput, reason))?;
-    let count = positions.len();
+pub fn write_vtu(path: &Path, grid: &Grid, fields: &[(&str, FieldData<'_>)], time: f64) -> io::Result<()> {
+    let (count, precision) = (grid.count, grid.precision);
+    check(count, fields).map_err(|reason| named(path, io::ErrorKind::InvalidInput, reason))?;
+    let packed: Vec<Packed> = fields
+        .iter()
+        .map(|(_, data)| match *data {
+            FieldData::Scalar(values) => reals(values, precision),
+            FieldData::Vector(values) => reals(values.as_flattened(), precision),
+            FieldData::Integer(values) => integers(count, |i| values[i]),
+        })
+        .collect();
     let mut appended = Appended::default();
     let mut xml = String::from(concat!(
         "<?xml version=\"1.0\"?>\n",
@@ -69,12 +98,7 @@ pub fn write_vtu(
          format=\"ascii\">{time:e}</DataArray>\n</FieldData>\n\
          <Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>"
     );
-    for (name, data) in fields {
-        let packed = match *data {
-            FieldData::Scalar(values) => reals(values, precision),
-            FieldData::Vector(values) => reals(values.as_flattened(), precision),
-            FieldData::Integer(values) => integers(count, |i| values[i]),
-        };
+    for ((name, data), packed) in fields.iter().zip(&packed) {
         let (kind, components) = match data {
             FieldData::Scalar(_) => (precision.name(), 1),
             FieldData::Vector(_) => (precision.name(), 3),
@@ -83,16 +107,11 @@ pub fn write_vtu(
         appended.push(&mut xml, &escaped(name), kind, components, packed);
     }
     xml.push_str("</PointData>\n<Points>\n");
-    let packed = reals(positions.as_flattened(), precision);
-    appended.push(&mut xml, "Points", precision.name(), 3, packed);
+    appended.push(&mut xml, "Points", precision.name(), 3, &grid.points);
     xml.push_str("</Points>\n<Cells>\n");
-    let packed = integers(count, |i| i as i64);
-    appended.push(&mut xml, "connectivity", "Int64", 1, packed);
-    let packed = integers(count, |i| i as i64 + 1);
-    appended.push(&mut xml, "offsets", "Int64", 1, packed);
-    const VERTEX: u8 = 1; // VTK's number of the cell type
-    let packed = Packed::new(count, 1, |range, bytes| bytes.extend(range.map(|_| VERTEX)));
-    appended.push(&mut xml, "types", "UInt8", 1, packed);
+    appended.push(&mut xml, "connectivity", "Int64", 1, &grid.connectivity);
+    appended.push(&mut xml, "offsets", "Int64", 1, &grid.offsets);
+    appended.push(&mut xml, "types", "UInt8", 1, &grid.types);
     xml.push_str("</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n   _");
     write_whole(path, |file| {
         file.write_all(xml.as_bytes())?;
@@ -160,13 +179,13 @@ fn check(count: usize, fields: &[(&str, FieldData<'_>)]) -> Result<(), String> {
 
 /// The arrays that follow the XML, and how far they reach.
 #[derive(Default)]
-struct Appended {
-    arrays: Vec<Packed>,
+struct Appended<'a> {
+    arrays: Vec<&'a Packed>,
     length: usize,
 }
 
-impl Appended {
-    fn push(&mut self, xml: &mut String, name: &str, kind: &str, components: usize, data: Packed) {
+impl<'a> Appended<'a> {
+    fn push(&mut self, xml: &mut String, name: &str, kind: &str, components: usize, data: &'a Packed) {
         let _ = writeln!(
             xml,
             "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" \
@@ -303,7 +322,7 @@ mod tests {
                 ("mark", FieldData::Integer(&marks)),
                 ("velocity", FieldData::Vector(&positions)),
             ];
-            write_vtu(&path, &positions, &fields, 1e-6, Precision::Float64).unwrap();
+            write_vtu(&path, &Grid::new(&positions, Precision::Float64), &fields, 1e-6).unwrap();
             let file = fs::read(&path).unwrap();
             let real = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().unwrap());
             let read: Vec<f64> = array(&file, "damage").chunks(8).map(real).collect();
@@ -325,7 +344,7 @@ mod tests {
         let path = folder.join("frame.vtu");
         let values = [0.1, f64::NAN];
         let fields = [("a<b>&\"c\"", FieldData::Scalar(&values))];
-        write_vtu(&path, &[[0.0; 3]; 2], &fields, 0.0, Precision::Float32).unwrap();
+        write_vtu(&path, &Grid::new(&[[0.0; 3]; 2], Precision::Float32), &fields, 0.0).unwrap();
         let bytes = array(&fs::read(&path).unwrap(), "a&lt;b&gt;&amp;&quot;c&quot;");
         let read: Vec<f32> = bytes.chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect();
         assert_eq!(read[0], 0.1_f32);
@@ -338,7 +357,7 @@ mod tests {
         let path = Path::new("/no/such/folder/frame.vtu");
         let short = FieldData::Scalar(&[1.0]);
         let write = |fields: &[(&str, FieldData<'_>)]| {
-            write_vtu(path, &[[0.0; 3]; 2], fields, 0.0, Precision::Float64).unwrap_err().to_string()
+            write_vtu(path, &Grid::new(&[[0.0; 3]; 2], Precision::Float64), fields, 0.0).unwrap_err().to_string()
         };
         let said = write(&[("damage", short)]);
         assert!(said.contains("frame.vtu: field `damage` has 1 values"), "{said}");

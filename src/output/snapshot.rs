@@ -1,0 +1,80 @@
+//! What is handed to writers: fields of one instant, copied on the stepping thread, each computed once however many
+//! want it. Deliberately not here: any decision when something is due, and any file.
+
+use std::sync::Arc;
+
+use super::source::{Points, Source};
+use crate::field::{Field, Values};
+use crate::solver::Clock;
+
+/// The fields that a writer wants to be handed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Wants {
+    pub fields: Vec<&'static str>,
+    /// At this point only; everywhere if None.
+    pub point: Option<usize>,
+}
+
+/// What one writer sees of one instant.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    pub clock: Clock,
+    pub points: Arc<Points>,
+    /// Those that the writer wants and the model has, in the writer's order.
+    pub fields: Vec<Arc<Field>>,
+}
+
+impl Snapshot {
+    pub fn field(&self, name: &str) -> Option<&Field> {
+        self.fields.iter().map(Arc::as_ref).find(|field| field.name == name)
+    }
+
+    /// How many numbers it holds.
+    pub fn numbers(&self) -> usize {
+        self.fields
+            .iter()
+            .map(|field| match &field.values {
+                Values::Scalar(values) => values.len(),
+                Values::Vector(values) => 3 * values.len(),
+            })
+            .sum()
+    }
+}
+
+/// A look at a model at one instant, while it stands still.
+pub struct Look<'a> {
+    pub source: &'a mut dyn Source,
+    clock: Clock,
+    /// Fields that somebody has asked for.
+    known: Vec<Arc<Field>>,
+}
+
+impl<'a> Look<'a> {
+    pub fn new(source: &'a mut dyn Source, clock: Clock) -> Self {
+        Look { source, clock, known: Vec::new() }
+    }
+
+    /// A field by name; None if the model has no such field.
+    pub fn field(&mut self, name: &str) -> Option<Arc<Field>> {
+        if let Some(known) = self.known.iter().find(|field| field.name == name) {
+            return Some(known.clone());
+        }
+        let field = Arc::new(self.source.field(name)?);
+        self.known.push(field.clone());
+        Some(field)
+    }
+
+    /// What a writer wants of this instant.
+    pub fn snapshot(&mut self, wants: &Wants) -> Snapshot {
+        let fields = match wants.point {
+            None => wants.fields.iter().filter_map(|name| self.field(name)).collect(),
+            Some(point) => wants.fields.iter().filter_map(|name| self.field_at(name, point)).collect(),
+        };
+        Snapshot { clock: self.clock, points: self.source.points().clone(), fields }
+    }
+
+    fn field_at(&mut self, name: &str, point: usize) -> Option<Arc<Field>> {
+        let known = self.known.iter().find(|field| field.name == name);
+        known.map(|field| field.at(point)).or_else(|| self.source.field_at(name, point)).map(Arc::new)
+    }
+}
