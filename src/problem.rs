@@ -155,7 +155,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             Arrangement::Lattice(lattice) => (None, lattice.cell_volume()),
             Arrangement::Scattered { volumes, .. } => (Some(volumes), 1.0),
         };
-        let [square, momentum @ ..] = self.exec.sum(cloud.n_slots(), |slots| {
+        let [square, momentum @ ..] = self.exec.sum(cloud.n_slots(), &|slots| {
             let volumes = volumes.map(|v| &v[slots.clone()]);
             let mut sum = [0.0; 4];
             for d in 0..D {
@@ -233,7 +233,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         let (cloud, rho) = (&self.body.cloud, self.physics.density);
         let v = components::<D, _>(&self.state.velocity);
         let n = cloud.n_points();
-        let [strain, scale, ..] = self.exec.sum(n, |points| {
+        let [strain, scale, ..] = self.exec.sum(n, &|points| {
             let (mut strain, mut scale) = (0.0, 0.0);
             for slot in cloud.stored(points) {
                 let volume = cloud.volume(slot);
@@ -249,7 +249,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             let mass = rho * cloud.volume(slot);
             embed::<D>(&std::array::from_fn(|d| mass * v[d][slot].to_f64()))
         };
-        let angular = self.exec.sum(n, |points| {
+        let angular = self.exec.sum(n, &|points| {
             let mut sum = [0.0; 4];
             for slot in cloud.stored(points) {
                 let x = cloud.position(slot);
@@ -292,12 +292,9 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         let slots = &self.body.cloud.slots[points];
         let vector = |flat: &[P::Field]| {
             let parts = components::<D, _>(flat);
-            let at = |&slot: &u32| embed::<D>(&std::array::from_fn(|d| parts[d][slot as usize].to_f64()));
-            Values::Vector(slots.par_iter().map(at).collect())
+            Values::Vector(gather(slots, &|slot| embed::<D>(&std::array::from_fn(|d| parts[d][slot].to_f64()))))
         };
-        let scalar = |value: &(dyn Fn(usize) -> f64 + Sync)| {
-            Values::Scalar(slots.par_iter().map(|&slot| value(slot as usize)).collect())
-        };
+        let scalar = |value: &(dyn Fn(usize) -> f64 + Sync)| Values::Scalar(gather(slots, value));
         let (name, unit, values) = match name {
             "displacement" => ("displacement", "m", vector(&self.state.displacement)),
             "velocity" => ("velocity", "m/s", vector(&self.state.velocity)),
@@ -364,6 +361,11 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
     pub fn broken_pairs(&self) -> u64 {
         self.state.broken.bonds / 2
     }
+}
+
+/// A value for each slot. Compiled for each type of value only.
+fn gather<T: Send>(slots: &[u32], value: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
+    slots.par_iter().map(|&slot| value(slot as usize)).collect()
 }
 
 /// Σ v² V and Σ v V; V = 1 where none is given. Eight sums side by side, so that the loop is vectors.

@@ -1,6 +1,8 @@
 //! The same numbers whichever way they are computed: on a lattice or on the same points as a scattered cloud, on any
 //! number of threads.
 
+use std::ops::Range;
+
 use bondwise::case::build::{Options, build};
 use bondwise::case::model::Case;
 use bondwise::case::read_text;
@@ -176,7 +178,7 @@ fn forces_and_broken_bonds_have_the_same_bits_on_any_number_of_threads() {
                 let mut density = vec![0.0; body.cloud.n_slots()];
                 physics.strain_energy_density(&body, &mut exec, &state, &mut density);
                 let slots = &body.cloud.slots;
-                let sum = exec.sum(slots.len(), |points| {
+                let sum = exec.sum(slots.len(), &|points: Range<usize>| {
                     [slots[points].iter().map(|&s| density[s as usize]).sum(), 0.0, 0.0, 0.0]
                 })[0];
                 (force, state.states.bytes(), state.broken.bonds, state.broken.energy.to_bits(), sum.to_bits())

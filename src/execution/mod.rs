@@ -181,17 +181,19 @@ impl Exec {
             (Families::Lattice(families), BondWeights::Lattice(weights)) => {
                 let view = &lattice::View::new(body, families, weights);
                 let sum = lattice::Sum::<D, I, O, P, _> { instructions, view, states, input, output, kernel };
-                self.broken.resize(view.n_chunks(), Broken::default());
                 if K::LINEAR && R::NEVER {
                     let sum = rows::Sum::new(&sum);
-                    (0..view.n_chunks()).into_par_iter().for_each(|chunk| sum.run(chunk));
+                    self.each_chunk(view.n_chunks(), &|chunk| {
+                        sum.run(chunk);
+                        Broken::default()
+                    })
                 } else {
-                    self.broken.par_iter_mut().enumerate().for_each(|(chunk, broken)| *broken = sum.run(chunk, rule));
+                    self.each_chunk(view.n_chunks(), &|chunk| sum.run(chunk, rule))
                 }
             }
             (Families::Cloud(families), BondWeights::Cloud(weights)) => {
-                let records = P::records(&mut self.double, &mut self.single);
-                cloud::gather_input(&input, records);
+                let mut records = std::mem::take(P::records(&mut self.double, &mut self.single));
+                cloud::gather_input(&input, &mut records);
                 let (sites, input) = (P::sites(&families.sites), &records[..]);
                 let sum = cloud::Sum::<D, I, O, P, _> {
                     instructions,
@@ -203,20 +205,27 @@ impl Exec {
                     output,
                     kernel,
                 };
-                self.broken.resize(n.div_ceil(cloud::CHUNK), Broken::default());
-                self.broken.par_iter_mut().enumerate().for_each(|(chunk, broken)| {
-                    *broken = sum.run(chunk * cloud::CHUNK..((chunk + 1) * cloud::CHUNK).min(n), rule);
+                let broken = self.each_chunk(n.div_ceil(cloud::CHUNK), &|chunk| {
+                    sum.run(chunk * cloud::CHUNK..((chunk + 1) * cloud::CHUNK).min(n), rule)
                 });
+                *P::records(&mut self.double, &mut self.single) = records;
+                broken
             }
             _ => unreachable!("weights are built on the families of their body"),
         }
+    }
+
+    /// Runs `work` on every chunk, and adds what broke in their order. Not generic, so that it is compiled once.
+    fn each_chunk(&mut self, n_chunks: usize, work: &(dyn Fn(usize) -> Broken + Sync)) -> Broken {
+        self.broken.resize(n_chunks, Broken::default());
+        self.broken.par_iter_mut().enumerate().for_each(|(chunk, broken)| *broken = work(chunk));
         self.broken
             .iter()
             .fold(Broken::default(), |sum, b| Broken { bonds: sum.bonds + b.bonds, energy: sum.energy + b.energy })
     }
 
     /// Σ over 0..n of four numbers at a time, in chunks of fixed size added in order.
-    pub fn sum(&mut self, n: usize, partial: impl Fn(Range<usize>) -> [f64; 4] + Sync) -> [f64; 4] {
+    pub fn sum(&mut self, n: usize, partial: &(dyn Fn(Range<usize>) -> [f64; 4] + Sync)) -> [f64; 4] {
         self.partial.resize(n.div_ceil(CHUNK), [0.0; 4]);
         self.partial.par_iter_mut().enumerate().for_each(|(chunk, sum)| {
             *sum = partial(chunk * CHUNK..((chunk + 1) * CHUNK).min(n));
