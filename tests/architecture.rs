@@ -89,10 +89,12 @@ fn only_execution_is_unsafe_and_only_the_program_prints() {
 }
 
 #[test]
-fn no_fused_multiply_add_and_no_parallel_float_sum() {
+fn fused_operations_belong_to_lanes_and_no_parallel_float_sum() {
+    // Outside the loops over packs a fused operation is a call of a function, or other bits on another machine.
+    let lanes = ["lane", "execution", "physics", "family"];
     for path in library() {
         let code = code(&path);
-        assert!(!code.contains(".mul_add("), "fused operations change bits: {}", path.display());
+        assert!(!code.contains(".mul_add(") || lanes.contains(&&*module(&path)), "{}", path.display());
         let parallel_sum = code.contains("par_iter") && code.contains(".sum::<f64>()");
         assert!(module(&path) != "execution" || !parallel_sum, "{}", path.display());
     }
