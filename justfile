@@ -12,6 +12,11 @@ verify-full:
 
 bench:
     cargo run --release -- bench
+    cargo bench --bench sum_bonds
+
+# Instructions a bond; `just instructions --bless` after a change that was meant.
+instructions *options:
+    python3 benches/instructions.py {{options}}
 
 format:
     cargo fmt --all

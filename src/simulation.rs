@@ -448,7 +448,7 @@ mod tests {
         assert_eq!(steps(&seen[0]), (0..=10).map(|k| 2 * k).collect::<Vec<_>>());
         assert_eq!(steps(&seen[1]), [0, 3, 6, 9, 12, 15, 18, 20]);
         let mut all: Vec<_> = seen.iter().flat_map(|seen| seen.lock().unwrap().clone()).collect();
-        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all.sort_by_key(|entry| entry.0);
         all.dedup();
         // Equal instants gave equal values, and the values count the computations.
         assert_eq!(

@@ -71,7 +71,7 @@ fn items(topic: &str, schema: &Value) -> Vec<(String, String)> {
     match topic {
         "cases" => bundled::CASES.iter().map(|c| plain((c.name, c.about))).collect(),
         "studies" => STUDIES.iter().map(|s| plain((s.name, s.about))).collect(),
-        "problems" => PROBLEMS.iter().copied().map(plain).collect(),
+        "problems" => PROBLEMS.iter().map(|p| plain((p.name, p.about))).collect(),
         "conditions" => {
             let mut all = Vec::new();
             for (key, name) in [("initial", "Motion"), ("prescribe", "Motion"), ("load", "Load")] {

@@ -55,8 +55,8 @@ enum Command {
     #[command(after_help = "Example:\n  bondwise verify                     (all quick studies)\n  \
         bondwise verify crack-branching --out proof --json")]
     Verify(verify::VerifyArgs),
-    /// Measure it: bond updates per second and bytes per point.
-    #[command(after_help = "Example:\n  bondwise bench block3d --json")]
+    /// Measure it: time per bond, bytes per point, and the fraction of what this machine can do.
+    #[command(after_help = "Example:\n  bondwise bench block3d --size 40 64 --precision double single --json")]
     Bench(bench::BenchArgs),
 }
 

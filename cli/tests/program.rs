@@ -437,3 +437,63 @@ fn a_wrong_command_line_is_a_matter_of_usage() {
         assert!(error.contains("--help") || error.contains("Usage"), "{args:?}: {error}");
     }
 }
+
+/// Rows of a quick benchmark.
+fn benchmark(place: &Place, args: &[&str]) -> Vec<Value> {
+    let (code, out, error) = place.call(&[&["bench"], args, &["--size", "12", "--json"]].concat());
+    assert_eq!(code, 0, "{error}");
+    serde_json::from_str(&out).unwrap()
+}
+
+#[test]
+fn a_benchmark_measures_bonds_and_what_they_are_a_fraction_of() {
+    let place = Place::new("bench");
+    let rows = benchmark(&place, &["block3d", "--steps", "2", "--threads", "1", "2", "--precision", "double,single"]);
+    let what = |row: &Value| (row["threads"].clone(), row["precision"].clone());
+    let expected = [(1, "double"), (1, "single"), (2, "double"), (2, "single")];
+    assert_eq!(rows.iter().map(what).collect::<Vec<_>>(), expected.map(|(t, p)| (t.into(), p.into())));
+    for row in &rows {
+        assert_eq!((&row["problem"], &row["path"]), (&"block3d".into(), &"lattice".into()));
+        assert_eq!(row["points"], 1728);
+        for key in [
+            "bonds",
+            "setup_seconds",
+            "setup_steps",
+            "ns_per_bond",
+            "best_ns_per_bond",
+            "bond_updates_per_second",
+            "points_per_second",
+            "bytes_per_point",
+            "gigabytes_per_second",
+            "gigaflops",
+        ] {
+            assert!(row[key].as_f64().is_some_and(|x| x > 0.0), "{key} in {row:#}");
+        }
+        assert!(row["best_ns_per_bond"].as_f64() <= row["ns_per_bond"].as_f64());
+        for key in ["fraction_of_peak_flops", "fraction_of_bandwidth"] {
+            // Above one only where a small body stays in the cache, or where the machine was disturbed in between.
+            assert!(row[key].as_f64().is_some_and(|x| 0.0 < x && x < 1.5), "{key} in {row:#}");
+        }
+    }
+}
+
+#[test]
+fn bonds_break_in_the_problems_that_say_so_and_in_no_others() {
+    let place = Place::new("bench_breaking");
+    for row in benchmark(&place, &["--steps", "10"]) {
+        let broken = row["broken_pairs"].as_u64().unwrap();
+        let says_so = row["problem"].as_str().unwrap().ends_with("-breaking");
+        assert_eq!(broken > 0, says_so, "{row:#}");
+        assert!(broken < row["bonds"].as_u64().unwrap() / 20, "{row:#}");
+    }
+}
+
+#[test]
+fn a_benchmark_of_no_problem_is_a_matter_of_usage() {
+    let place = Place::new("bench_unknown");
+    let (code, out, error) = place.call(&["bench", "block4d"]);
+    assert_eq!((code, out.as_str()), (2, ""));
+    assert!(error.contains("'block4d'") && error.contains("block3d-breaking") && error.contains("--help"), "{error}");
+    assert_eq!(place.call(&["bench", "block3d", "--precision", "half"]).0, 2);
+    assert_eq!(place.call(&["bench", "block3d", "--size", "2"]).0, 2);
+}

@@ -358,7 +358,7 @@ impl<const D: usize> Builder<'_, D> {
                 Some(perturb) => {
                     let mut random = ChaCha8Rng::seed_from_u64(perturb.seed);
                     let volume = lattice.cell_volume();
-                    let positions: Vec<Vector<D>> = cloud
+                    let mut positions: Vec<Vector<D>> = cloud
                         .slots
                         .iter()
                         .map(|&slot| {
@@ -368,6 +368,11 @@ impl<const D: usize> Builder<'_, D> {
                             })
                         })
                         .collect();
+                    if perturb.shuffle {
+                        for k in (1..positions.len()).rev() {
+                            positions.swap(k, (random.next_u64() % (k as u64 + 1)) as usize);
+                        }
+                    }
                     let volumes = vec![volume; positions.len()];
                     Cloud::scattered(positions, volumes)
                 }

@@ -69,6 +69,9 @@ pub struct Perturb {
     /// The same seed gives the same points.
     #[serde(default)]
     pub seed: u64,
+    /// Numbers the points in random order, as points from elsewhere may be.
+    #[serde(default)]
+    pub shuffle: bool,
 }
 
 /// Points from a file.

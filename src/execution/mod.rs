@@ -48,6 +48,7 @@ macro_rules! compiled {
 
 mod cloud;
 mod lattice;
+pub mod machine;
 mod packs;
 mod rows;
 

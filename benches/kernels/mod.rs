@@ -1,0 +1,137 @@
+//! The sums over bonds that are timed and counted: each by its name, on a body of the asked size.
+
+use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
+use bondwise::execution::{Exec, Instructions, Packs};
+use bondwise::family::{Body, BondLaw};
+use bondwise::field::{Double, Mixed, Number, Single, components_mut};
+use bondwise::geometry::{Cloud, Shape};
+use bondwise::physics::Elasticity;
+use bondwise::physics::elasticity::State;
+use bondwise::physics::elasticity::bond_based::{BondBased, BondBasedLinear};
+use bondwise::physics::failure::CriticalStretch;
+
+/// Points along the edges of the bodies.
+#[derive(Debug, Clone, Copy)]
+pub struct Edges {
+    pub plate: [usize; 2],
+    /// Long along x, so that many blocks have all their bonds.
+    pub solid: [usize; 3],
+    pub cloud: [usize; 3],
+}
+
+/// A kernel on its body.
+pub struct Kernel {
+    /// Directed: bond updates of one evaluation.
+    pub bonds: u64,
+    pub evaluate: Box<dyn FnMut()>,
+}
+
+type Maker = fn(Edges, Instructions) -> Kernel;
+
+/// What is summed.
+#[derive(Clone, Copy, PartialEq)]
+enum What {
+    /// Forces at strains for which the small form of the law serves.
+    Force,
+    /// The same where bonds never break: of a linear law, by rows.
+    Unbreakable,
+    /// Forces at strains that ask for the exact form, after the small one.
+    ExactForce,
+    /// The strain energy density.
+    Energy,
+}
+
+/// All kernels: what, law, path and dimension, precision.
+#[rustfmt::skip] // a table
+pub const KERNELS: [(&str, Maker); 26] = [
+    ("force/bond_based/lattice2d/double", |e, i| plate::<_, Double>(BondBased, What::Force, e, i)),
+    ("force/bond_based/lattice2d/single", |e, i| plate::<_, Single>(BondBased, What::Force, e, i)),
+    ("force/bond_based/lattice2d/mixed", |e, i| plate::<_, Mixed>(BondBased, What::Force, e, i)),
+    ("force/bond_based/lattice3d/double", |e, i| solid::<_, Double>(BondBased, What::Force, e, i)),
+    ("force/bond_based/lattice3d/single", |e, i| solid::<_, Single>(BondBased, What::Force, e, i)),
+    ("force/bond_based/lattice3d/mixed", |e, i| solid::<_, Mixed>(BondBased, What::Force, e, i)),
+    ("force/bond_based/cloud3d/double", |e, i| cloud::<_, Double>(BondBased, What::Force, e, i)),
+    ("force/bond_based/cloud3d/single", |e, i| cloud::<_, Single>(BondBased, What::Force, e, i)),
+    ("force/bond_based/cloud3d/mixed", |e, i| cloud::<_, Mixed>(BondBased, What::Force, e, i)),
+    ("force/bond_based_linear/lattice2d/double", |e, i| plate::<_, Double>(BondBasedLinear, What::Force, e, i)),
+    ("force/bond_based_linear/lattice2d/single", |e, i| plate::<_, Single>(BondBasedLinear, What::Force, e, i)),
+    ("force/bond_based_linear/lattice2d/mixed", |e, i| plate::<_, Mixed>(BondBasedLinear, What::Force, e, i)),
+    ("force/bond_based_linear/lattice3d/double", |e, i| solid::<_, Double>(BondBasedLinear, What::Force, e, i)),
+    ("force/bond_based_linear/lattice3d/single", |e, i| solid::<_, Single>(BondBasedLinear, What::Force, e, i)),
+    ("force/bond_based_linear/lattice3d/mixed", |e, i| solid::<_, Mixed>(BondBasedLinear, What::Force, e, i)),
+    ("force/bond_based_linear/cloud3d/double", |e, i| cloud::<_, Double>(BondBasedLinear, What::Force, e, i)),
+    ("force/bond_based_linear/cloud3d/single", |e, i| cloud::<_, Single>(BondBasedLinear, What::Force, e, i)),
+    ("force/bond_based_linear/cloud3d/mixed", |e, i| cloud::<_, Mixed>(BondBasedLinear, What::Force, e, i)),
+    ("rows/bond_based_linear/lattice2d/double", |e, i| plate::<_, Double>(BondBasedLinear, What::Unbreakable, e, i)),
+    ("rows/bond_based_linear/lattice3d/double", |e, i| solid::<_, Double>(BondBasedLinear, What::Unbreakable, e, i)),
+    ("rows/bond_based_linear/lattice3d/single", |e, i| solid::<_, Single>(BondBasedLinear, What::Unbreakable, e, i)),
+    ("rows/bond_based_linear/lattice3d/mixed", |e, i| solid::<_, Mixed>(BondBasedLinear, What::Unbreakable, e, i)),
+    ("exact_force/bond_based/lattice3d/double", |e, i| solid::<_, Double>(BondBased, What::ExactForce, e, i)),
+    ("exact_force/bond_based/cloud3d/double", |e, i| cloud::<_, Double>(BondBased, What::ExactForce, e, i)),
+    ("energy/bond_based/lattice3d/double", |e, i| solid::<_, Double>(BondBased, What::Energy, e, i)),
+    ("energy/bond_based/cloud3d/double", |e, i| cloud::<_, Double>(BondBased, What::Energy, e, i)),
+];
+
+/// The kernel of a name, if there is one.
+pub fn kernel(name: &str, edges: Edges, instructions: Instructions) -> Option<Kernel> {
+    KERNELS.iter().find(|k| k.0 == name).map(|(_, make)| make(edges, instructions))
+}
+
+/// Δx, m.
+const SPACING: f64 = 1e-3;
+
+fn filled<const D: usize>(edges: [usize; D]) -> Cloud<D> {
+    Cloud::lattice(&Shape::Box { low: [0.0; D], high: edges.map(|n| n as f64 * SPACING) }, SPACING, 4)
+}
+
+fn plate<L: BondLaw<2> + 'static, P: Packs>(law: L, what: What, edges: Edges, instructions: Instructions) -> Kernel {
+    on_body::<2, L, P>(filled(edges.plate), law, what, instructions)
+}
+
+fn solid<L: BondLaw<3> + 'static, P: Packs>(law: L, what: What, edges: Edges, instructions: Instructions) -> Kernel {
+    on_body::<3, L, P>(filled(edges.solid), law, what, instructions)
+}
+
+/// The points of a lattice, each moved a little.
+fn cloud<L: BondLaw<3> + 'static, P: Packs>(law: L, what: What, edges: Edges, instructions: Instructions) -> Kernel {
+    let lattice = filled::<3>(edges.cloud);
+    let moved = |(k, &slot): (usize, &u32)| {
+        let phase = k as f64;
+        let [x, y, z] = lattice.position(slot as usize);
+        let shift = |factor: f64| 0.05 * SPACING * (factor * phase).sin();
+        [x + shift(1.3), y + shift(2.9), z + shift(4.7)]
+    };
+    let positions: Vec<[f64; 3]> = lattice.slots.iter().enumerate().map(moved).collect();
+    let volumes = vec![SPACING.powi(3); positions.len()];
+    on_body::<3, L, P>(Cloud::scattered(positions, volumes), law, what, instructions)
+}
+
+/// A body, slightly deformed, in which no bond breaks.
+fn on_body<const D: usize, L: BondLaw<D> + 'static, P: Packs>(
+    points: Cloud<D>,
+    law: L,
+    what: What,
+    instructions: Instructions,
+) -> Kernel {
+    let body: Body<D> = standard::body(points, 3.015 * SPACING, PartialVolume::None);
+    let operator = Operator::standard(&body, 1.0, Influence::Constant, PartialVolume::None);
+    let failure = (what != What::Unbreakable).then(|| CriticalStretch::uniform(0.1));
+    let physics = Elasticity { law, density: 1.0, operator, failure };
+    let mut state: State<P> = physics.initial_state(&body);
+    // Strains up to 0.1 %, or 3 %: those of the first are below the 1 % up to which small forms serve.
+    let stretch = if what == What::ExactForce { 3e-2 } else { 1e-3 };
+    for &slot in &body.cloud.slots {
+        let x = body.cloud.position(slot as usize);
+        for (d, u) in components_mut::<D, _>(&mut state.displacement).into_iter().enumerate() {
+            u[slot as usize] = P::Field::from_f64(stretch * x[d] / (d + 1) as f64);
+        }
+    }
+    let bonds = state.states.count();
+    let mut exec = Exec::on(instructions);
+    let mut density = vec![P::Field::default(); body.cloud.n_slots()];
+    let evaluate = move || match what {
+        What::Energy => physics.strain_energy_density(&body, &mut exec, &state, &mut density),
+        What::Force | What::ExactForce | What::Unbreakable => physics.evaluate(&body, &mut exec, &mut state, 0.0),
+    };
+    Kernel { bonds, evaluate: Box::new(evaluate) }
+}

@@ -1,0 +1,161 @@
+//! The problems that are timed: their names, and the cases that they stand for.
+
+use bondwise::case::bundled;
+
+/// Which loop sums the bonds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Path {
+    /// One list of offsets, one bit a bond.
+    Lattice,
+    /// A list of neighbours for each point, one bit a bond.
+    Cloud,
+    /// One row of numbers for all points: a linear law whose bonds never break.
+    Rows,
+}
+
+impl Path {
+    pub fn name(self) -> &'static str {
+        match self {
+            Path::Lattice => "lattice",
+            Path::Cloud => "cloud",
+            Path::Rows => "rows",
+        }
+    }
+}
+
+/// What a problem is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Body {
+    /// A cube of n³ points.
+    Cube,
+    /// The plate of the bundled case `crack_branching`.
+    Plate,
+}
+
+/// A problem to be timed.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem {
+    pub name: &'static str,
+    pub about: &'static str,
+    pub body: Body,
+    pub path: Path,
+    /// Whether the law is linearised.
+    pub linear: bool,
+    /// Whether bonds break while it is timed.
+    pub breaking: bool,
+}
+
+/// All of them, in the order of the table.
+#[rustfmt::skip] // a table
+pub const PROBLEMS: [Problem; 9] = {
+    use {Body::*, Path::*};
+    const fn problem(
+        name: &'static str, body: Body, path: Path, linear: bool, breaking: bool, about: &'static str,
+    ) -> Problem {
+        Problem { name, about, body, path, linear, breaking }
+    }
+    [
+        problem("block3d", Cube, Lattice, false, false,
+            "cube of n³ points on a lattice, horizon 3.015 spacings, no bond breaks"),
+        problem("block3d-breaking", Cube, Lattice, false, true,
+            "the same cube with a crack that runs: bonds break in every step"),
+        problem("block3d-linear", Cube, Lattice, true, false,
+            "the cube with the linearised law; bonds may break, none does"),
+        problem("block3d-linear-breaking", Cube, Lattice, true, true,
+            "the cube with the linearised law and a crack that runs"),
+        problem("rows3d", Cube, Rows, true, false,
+            "the cube with the linearised law, without failure"),
+        problem("cloud3d", Cube, Cloud, false, false,
+            "the same points disturbed and in random order: a scattered cloud"),
+        problem("cloud3d-breaking", Cube, Cloud, false, true,
+            "the same cloud with a crack that runs"),
+        problem("plate2d", Plate, Lattice, false, false,
+            "the bundled case crack_branching in its first steps, no bond breaks"),
+        problem("plate2d-breaking", Plate, Lattice, false, true,
+            "the same while its crack runs"),
+    ]
+};
+
+impl Problem {
+    pub fn named(name: &str) -> Option<&'static Problem> {
+        PROBLEMS.iter().find(|p| p.name == name)
+    }
+
+    /// Steps that are taken before any is timed.
+    pub fn warm_up(&self) -> u32 {
+        match (self.body, self.breaking) {
+            (_, false) => 2,
+            // Its crack has opened, and breaks bonds in nearly every step from here.
+            (Body::Cube, true) => 12,
+            // Its crack starts after some 270 of the 642 steps of the case.
+            (Body::Plate, true) => 320,
+        }
+    }
+
+    /// The case to run, for a cube of `n` points along an edge.
+    pub fn case(&self, n: u32) -> String {
+        match self.body {
+            Body::Cube => self.cube(n),
+            Body::Plate => bundled::CASES[0].case.to_string(),
+        }
+    }
+
+    /// Δx = 0.5 mm, E = 72 GPa, ρ = 2440 kg/m³, steps of 20 ns.
+    ///
+    /// Either it is drawn apart along x at ±1 m/s, far from any strain that breaks bonds; or it starts stretched along
+    /// x to nine tenths of the critical stretch, with a crack in the middle plane x = constant that cuts into it from
+    /// y = 0 so far that about 1 % of the points lose bonds (those within a horizon of it), and is let go: the crack
+    /// opens and runs.
+    fn cube(&self, n: u32) -> String {
+        let half = f64::from(n / 2) * 5e-4;
+        let edge = f64::from(n) * 5e-4;
+        let depth = (edge * f64::from(n) / 600.0).max(1e-3);
+        let (crack, motion) = if self.breaking {
+            let (out, side) = (edge + 1e-3, format!("{half:e}"));
+            (
+                format!(
+                    "cracks = [{{ polygon = {{ vertices = [[{side}, -1e-3, -1e-3], [{side}, {depth:e}, -1e-3], \
+                     [{side}, {depth:e}, {out:e}], [{side}, -1e-3, {out:e}]] }} }}]"
+                ),
+                "displacement = { component = 0, value = \"0.9 * 0.004 * x\" }",
+            )
+        } else {
+            (String::new(), "velocity = { component = 0, value = \"2*(x - 2.5e-4)/((n - 1)*5e-4) - 1\" }")
+        };
+        let failure = match (self.path, self.breaking) {
+            (Path::Rows, _) => "",
+            (_, false) => "failure = { critical_stretch = { stretch = 0.01 } }",
+            (_, true) => "failure = { critical_stretch = { stretch = 0.004 } }",
+        };
+        let disturbed = "perturb = { amplitude = 0.05, seed = 1, shuffle = true }";
+        let title = self.name;
+        let perturb = if self.path == Path::Cloud { disturbed } else { "" };
+        let law = if self.linear { "bond_based_linear" } else { "bond_based" };
+        format!(
+            r#"
+[case]
+title = "{title}"
+dimension = 3
+[constants]
+n = {n}
+[geometry]
+shape = {{ box = {{ low = [0, 0, 0], high = ["n*5e-4", "n*5e-4", "n*5e-4"] }} }}
+spacing = 5e-4
+{perturb}
+{crack}
+[discretization]
+horizon_ratio = 3.015
+partial_volumes = "none"
+[physics.elasticity]
+law = {{ {law} = {{ young = 72e9, density = 2440 }} }}
+{failure}
+[[conditions]]
+on = "all"
+initial = {{ {motion} }}
+[solver.velocity_verlet]
+end_time = 1
+time_step = 2e-8
+"#
+        )
+    }
+}
