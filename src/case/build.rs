@@ -430,10 +430,13 @@ impl<const D: usize> Builder<'_, D> {
         }
         let ball = [2.0, std::f64::consts::PI, 4.0 / 3.0 * std::f64::consts::PI][D - 1];
         let family = ball * (reach - 1.0).powi(D as i32);
+        let number = if self.case.value.discretization.precision == Precision::Single { 4.0 } else { 8.0 };
+        // Fields, slots and bonds, and what set-up and the books need for a while; for a cloud its records too.
+        let fields = (3 * D + 1) as f64 * number + 4.0 + 16.0;
         let per_point = if self.case.value.geometry.perturb.is_some() {
-            (3 * D + 1 + D + 1) as f64 * 8.0 + 6.2 * family
+            fields + (D + 1) as f64 * 8.0 + 48.0 + 4.0 * number + 5.0 * family
         } else {
-            (3 * D + 1) as f64 * 8.0 + 4.0 + 24.0 + family / 8.0
+            fields + family / 8.0
         };
         let bytes = points * per_point;
         let available = available_memory().unwrap_or(u64::MAX) as f64;
