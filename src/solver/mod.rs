@@ -14,8 +14,8 @@ pub struct Unknowns<'a, T> {
     pub force: &'a [T],
     /// ρ
     pub inertia: f64,
-    /// Displacements below this count as zero. Ahead of a wave they fall off without end, and a processor takes a
-    /// hundred times as long over numbers near the smallest that it knows.
+    /// Displacements below this count as zero. Ahead of a wave they fall off without end, and processors are
+    /// slow with numbers near the smallest that they know.
     pub negligible: f64,
 }
 
