@@ -108,6 +108,23 @@ impl Influence {
         }
     }
 
+    /// Terms of [`Influence::polynomial`].
+    pub const TERMS: usize = 8;
+
+    /// ω as a polynomial in y = 1 − t, constant term first; None for the Gaussian, which is none.
+    pub fn polynomial(&self) -> Option<[f64; Influence::TERMS]> {
+        Some(match self {
+            Influence::Constant => [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            Influence::Linear => [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            Influence::Inverted => [1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            Influence::Parabolic => [0.0, 2.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            Influence::Gaussian { .. } => return None,
+            Influence::Cubic => [0.0, 0.0, 3.0, -2.0, 0.0, 0.0, 0.0, 0.0],
+            Influence::Quintic => [0.0, 0.0, 0.0, 10.0, -15.0, 6.0, 0.0, 0.0],
+            Influence::Septic => [0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0],
+        })
+    }
+
     /// Radial moment R(p) = ∫₀¹ ω(t) tᵖ dt, for any real p.
     ///
     /// With the horizon δ, ∫₀^δ ω rᵖ dr = δ^(p+1) R(p). Infinite where the integral diverges at
@@ -160,6 +177,7 @@ fn gaussian_moment(width: f64, p: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::discretization::quadrature::integrate;
+    use crate::lane::polynomial;
 
     #[test]
     fn values_are_the_printed_formulas_and_stay_between_zero_and_one() {
@@ -179,6 +197,10 @@ mod tests {
                 let omega = influence.value(t);
                 assert!((omega - printed(&influence, t)).abs() < 1e-13, "{} at {t}", influence.name());
                 assert!((0.0..=1.0).contains(&omega), "{} at {t} is {omega}", influence.name());
+                if let Some(terms) = influence.polynomial() {
+                    let sum = polynomial(terms, 1.0 - t);
+                    assert!((omega - sum).abs() < 1e-14, "{} at {t}", influence.name());
+                }
             }
         }
     }

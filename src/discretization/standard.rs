@@ -40,6 +40,25 @@ pub struct CloudWeights {
     fractions: Fractions,
 }
 
+/// How the weights of a cloud follow from |ξ|, in a form for many bonds side by side.
+#[derive(Debug, Clone)]
+pub struct Profile<'a> {
+    /// Whether they do not: the weight is the volume times `influence[0]`.
+    pub plain: bool,
+    /// Whether there is no such form.
+    pub singly: bool,
+    /// strength × ω, per unit of volume, as a polynomial in 1 − |ξ|/δ.
+    pub influence: [f64; Influence::TERMS],
+    /// 1/δ, 1/m
+    pub inverse_horizon: f64,
+    /// β = (a − |ξ|) b between zero and one: a, m, and b, 1/m.
+    pub ramp: Option<[f64; 2]>,
+    /// β × 65535 by bond.
+    pub fractions: Option<&'a [u16]>,
+    /// A square of length that vanishes beside |ξ|² in the numbers of the precision, m².
+    pub negligible_square: f64,
+}
+
 #[derive(Debug, Clone)]
 enum Fractions {
     Full,
@@ -120,16 +139,25 @@ impl Operator {
 }
 
 impl CloudWeights {
-    /// What volumes are multiplied with where the weight depends on nothing else.
-    #[inline]
-    pub fn constant(&self) -> Option<f64> {
-        matches!((&self.influence, &self.fractions), (Influence::Constant, Fractions::Full)).then_some(self.strength)
-    }
-
-    /// A square of length that vanishes beside |ξ|² in the numbers of a precision, m².
-    #[inline]
-    pub fn negligible_square(&self, single: bool) -> f64 {
-        self.horizon * self.horizon * if single { 1e-12 } else { 1e-25 }
+    /// The same weights for many bonds side by side, with volumes in multiples of `volume_unit` (m³ in 3D) and numbers
+    /// of `single` or double precision.
+    pub fn profile(&self, volume_unit: f64, single: bool) -> Profile<'_> {
+        let terms = self.influence.polynomial();
+        let ramp =
+            matches!(self.fractions, Fractions::Ramp).then(|| [self.horizon + 0.5 * self.spacing, 1.0 / self.spacing]);
+        let fractions = match &self.fractions {
+            Fractions::Stored(fractions) => Some(&fractions[..]),
+            _ => None,
+        };
+        Profile {
+            plain: self.influence == Influence::Constant && ramp.is_none() && fractions.is_none(),
+            singly: terms.is_none(),
+            influence: terms.unwrap_or_default().map(|c| c * self.strength * volume_unit),
+            inverse_horizon: 1.0 / self.horizon,
+            ramp,
+            fractions,
+            negligible_square: self.horizon * self.horizon * if single { 1e-12 } else { 1e-25 },
+        }
     }
 
     /// The weight of bond number `bond`, of length |ξ| (m), to a point of volume V′.

@@ -11,9 +11,10 @@ use rayon::prelude::*;
 
 use super::packs::{Between, Ends, Instructions, Pack, Packs, SiteView};
 use super::{BreakRule, Broken, SharedSlice, StatesPointer};
-use crate::discretization::standard::CloudWeights;
+use crate::discretization::standard::{CloudWeights, Profile};
 use crate::family::{Bond, BondKernel, CloudFamilies, GROUP};
 use crate::field::Number;
+use crate::lane::polynomial;
 
 /// Points in a chunk: the unit that threads share out, and of the ordered sums.
 pub const CHUNK: usize = 512;
@@ -38,6 +39,7 @@ pub struct Sum<'a, const D: usize, const I: usize, const O: usize, P: Packs, K> 
     pub instructions: Instructions,
     pub families: &'a CloudFamilies,
     pub weights: &'a CloudWeights,
+    pub profile: Profile<'a>,
     pub sites: SiteView<'a, P::Site>,
     pub states: StatesPointer,
     /// The input values of a point side by side, zeros behind.
@@ -55,29 +57,35 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
             // SAFETY: `Exec::pass` has checked the lengths of all fields; neighbours are points of the cloud; the words
             // of a point and its slot belong to the chunk that owns the point.
             unsafe {
-                let mut largest = self.sum::<true>(point);
+                let mut largest = self.small(point);
                 if !R::NEVER && largest > threshold {
                     let here = self.break_bonds(point, rule);
                     if here.bonds > 0 {
                         broken.bonds += here.bonds;
                         broken.energy += here.energy;
-                        largest = self.sum::<true>(point);
+                        largest = self.small(point);
                     }
                 }
                 if largest > K::SMALL {
-                    self.sum::<false>(point);
+                    self.sum::<false, false>(point);
                 }
             }
         }
         broken
     }
 
-    compiled!(sum, sum_on, sum_avx2, sum_avx512, [with SMALL: bool], (point: usize), f64);
+    /// # Safety
+    /// As of [`Sum::sum`].
+    unsafe fn small(&self, point: usize) -> f64 {
+        unsafe { if self.profile.plain { self.sum::<true, true>(point) } else { self.sum::<true, false>(point) } }
+    }
+
+    compiled!(sum, sum_on, sum_avx2, sum_avx512, [with SMALL: bool, PLAIN: bool], (point: usize), f64);
     compiled!(break_bonds, break_on, break_avx2, break_avx512, [rule R: BreakRule<D>], (point: usize, rule: &R), Broken);
 
-    /// Sums one family into the output, in the small or the exact form; returns the largest |strain| of its whole bonds.
+    /// Sums one family into the output, in the small or the exact form, with `PLAIN` weights or any; returns the largest |strain| of its whole bonds.
     #[inline(always)]
-    unsafe fn sum_on<V, const SMALL: bool>(&self, point: usize) -> f64
+    unsafe fn sum_on<V, const SMALL: bool, const PLAIN: bool>(&self, point: usize) -> f64
     where
         V: Pack<P::Bond> + Ends<P::Field> + Between<P::Site>,
     {
@@ -91,7 +99,7 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
             }
             for part in 0..GROUP / V::LANES {
                 let mask = word >> (part * V::LANES);
-                let (bond, relative) = unsafe { self.bond::<V>(point, group, part, &here, mask) };
+                let (bond, relative) = unsafe { self.bond::<V, PLAIN>(point, group, part, &here, mask) };
                 let strain = self.kernel.strain(&bond, &relative);
                 watch = watch.larger(strain);
                 let sum = &mut sums[part];
@@ -111,20 +119,16 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         }
         for c in 0..O {
             // Lane k is added to lane k + 8, then to k + 4, k + 2, k + 1, however many lanes a pack has.
-            let mut lanes = [P::Bond::default(); GROUP];
-            for part in 0..GROUP / V::LANES {
-                unsafe { sums[part][c].unload(lanes.as_mut_ptr().add(part * V::LANES)) };
-            }
-            let mut width = GROUP / 2;
-            let mut total = lanes.map(Number::to_f64);
-            while width > 0 {
-                for k in 0..width {
-                    total[k] += total[k + width];
+            let mut parts = GROUP / V::LANES;
+            while parts > 1 {
+                parts /= 2;
+                for part in 0..parts {
+                    sums[part][c] = sums[part][c] + sums[part + parts][c];
                 }
-                width /= 2;
             }
+            let total = sums[0][c].total().to_f64();
             // SAFETY: `point` belongs to this chunk alone and the field has the length of the cloud.
-            unsafe { *self.output[c].0.add(point) = P::Field::from_f64(total[0]) };
+            unsafe { *self.output[c].0.add(point) = P::Field::from_f64(total) };
         }
         watch.largest()
     }
@@ -141,7 +145,8 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         for group in self.groups(point) {
             let word = unsafe { &mut *self.words().add(group) };
             for part in 0..GROUP / V::LANES {
-                let (bond, relative) = unsafe { self.bond::<V>(point, group, part, &here, *word >> (part * V::LANES)) };
+                let (bond, relative) =
+                    unsafe { self.bond::<V, false>(point, group, part, &here, *word >> (part * V::LANES)) };
                 let strain = self.kernel.strain(&bond, &relative);
                 if strain.largest() <= threshold {
                     continue;
@@ -172,22 +177,41 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
 
     /// The weights of consecutive bonds, from their lengths and the volumes at their other ends.
     #[inline(always)]
-    fn weigh<V: Pack<P::Bond>>(&self, first: usize, length: V, volume: V) -> V {
-        let unit = self.sites.volume_unit;
-        if let Some(strength) = self.weights.constant() {
-            return volume * V::splat(strength * unit);
+    fn weigh<V: Pack<P::Bond>, const PLAIN: bool>(&self, first: usize, length: V, volume: V) -> V {
+        let profile = &self.profile;
+        if PLAIN {
+            return volume * V::splat(profile.influence[0]);
         }
-        let (mut lengths, mut volumes) = ([P::Bond::default(); GROUP], [P::Bond::default(); GROUP]);
-        // SAFETY: a pack has at most `GROUP` lanes.
-        unsafe {
-            length.unload(lengths.as_mut_ptr());
-            volume.unload(volumes.as_mut_ptr());
-            for k in 0..V::LANES {
-                let weight = self.weights.weight(first + k, lengths[k].to_f64(), volumes[k].to_f64() * unit);
-                volumes[k] = P::Bond::from_f64(weight);
+        if profile.singly {
+            return self.weigh_singly(first, length, volume);
+        }
+        let one = V::splat(1.0);
+        let rim = length.mul_add(V::splat(-profile.inverse_horizon), one).clamped();
+        let mut weight = polynomial(profile.influence, rim) * volume;
+        if let Some([end, inverse_width]) = profile.ramp {
+            weight = weight * ((V::splat(end) - length) * V::splat(inverse_width)).clamped();
+        }
+        if let Some(fractions) = profile.fractions {
+            let mut betas = [P::Bond::default(); GROUP];
+            for (beta, fraction) in betas[..V::LANES].iter_mut().zip(&fractions[first..]) {
+                *beta = P::Bond::from_f64(f64::from(*fraction) / 65535.0);
             }
-            V::load(volumes.as_ptr())
+            // SAFETY: a pack has at most `GROUP` lanes.
+            weight = weight * unsafe { V::load(betas.as_ptr()) };
         }
+        weight
+    }
+
+    /// The same, bond by bond, for what has no form for many.
+    #[inline(never)]
+    fn weigh_singly<V: Pack<P::Bond>>(&self, first: usize, length: V, volume: V) -> V {
+        let mut weights = [P::Bond::default(); GROUP];
+        for k in 0..V::LANES {
+            let volume = volume.lane(k) * self.sites.volume_unit;
+            weights[k] = P::Bond::from_f64(self.weights.weight(first + k, length.lane(k), volume));
+        }
+        // SAFETY: a pack has at most `GROUP` lanes.
+        unsafe { V::load(weights.as_ptr()) }
     }
 
     #[inline(always)]
@@ -204,7 +228,7 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
 
     /// One part of a group of bonds, and the relative values of their ends.
     #[inline(always)]
-    unsafe fn bond<V>(
+    unsafe fn bond<V, const PLAIN: bool>(
         &self,
         point: usize,
         group: usize,
@@ -226,14 +250,14 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         let (vector, volume) = between;
         let mut xi = [V::splat(0.0); D];
         // Padding is the point itself: any length but zero will do, its bit is never set.
-        let mut square = V::splat(self.weights.negligible_square(V::SINGLE));
+        let mut square = V::splat(self.profile.negligible_square);
         for d in 0..D {
             xi[d] = vector[d];
             square = xi[d].mul_add(xi[d], square);
         }
         let inverse = square.inverse_root();
         let length = square * inverse;
-        let weight = self.weigh::<V>(first, length, volume);
+        let weight = self.weigh::<V, PLAIN>(first, length, volume);
         let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring: weight * inverse };
         let mut relative = [V::splat(0.0); I];
         if I > 0 {

@@ -8,24 +8,24 @@
 macro_rules! compiled {
     (
         $name:ident, $generic:ident, $avx2:ident, $avx512:ident,
-        [$(with $n:ident: $type:ident)? $(rule $t:ident: $bound:path)?], ($($argument:ident: $of:ty),*), $returns:ty
+        [$(with $($n:ident: $type:ident),*)? $(rule $t:ident: $bound:path)?], ($($argument:ident: $of:ty),*), $returns:ty
     ) => {
         /// # Safety
         /// As of the method for all packs; `self.instructions` must be on this machine.
         #[inline(never)]
-        pub unsafe fn $name<$(const $n: $type)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
+        pub unsafe fn $name<$($(const $n: $type),*)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
             // SAFETY: `Instructions` are given out for this machine alone.
             unsafe {
                 if D == 1 {
                     // Bars are small: a third of the kernels need not be compiled.
-                    return self.$generic::<P::Baseline, $($n)? $($t)?>($($argument),*);
+                    return self.$generic::<P::Baseline, $($($n),*)? $($t)?>($($argument),*);
                 }
                 match self.instructions {
                     #[cfg(target_arch = "x86_64")]
-                    Instructions::Avx512 => self.$avx512::<$($n)? $($t)?>($($argument),*),
+                    Instructions::Avx512 => self.$avx512::<$($($n),*)? $($t)?>($($argument),*),
                     #[cfg(target_arch = "x86_64")]
-                    Instructions::Avx2 => self.$avx2::<$($n)? $($t)?>($($argument),*),
-                    Instructions::Baseline => self.$generic::<P::Baseline, $($n)? $($t)?>($($argument),*),
+                    Instructions::Avx2 => self.$avx2::<$($($n),*)? $($t)?>($($argument),*),
+                    Instructions::Baseline => self.$generic::<P::Baseline, $($($n),*)? $($t)?>($($argument),*),
                 }
             }
         }
@@ -33,15 +33,15 @@ macro_rules! compiled {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,fma")]
         #[inline(never)]
-        unsafe fn $avx512<$(const $n: $type)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
-            unsafe { self.$generic::<P::Avx512, $($n)? $($t)?>($($argument),*) }
+        unsafe fn $avx512<$($(const $n: $type),*)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
+            unsafe { self.$generic::<P::Avx512, $($($n),*)? $($t)?>($($argument),*) }
         }
 
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2,fma")]
         #[inline(never)]
-        unsafe fn $avx2<$(const $n: $type)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
-            unsafe { self.$generic::<P::Avx2, $($n)? $($t)?>($($argument),*) }
+        unsafe fn $avx2<$($(const $n: $type),*)? $($t: $bound)?>(&self, $($argument: $of),*) -> $returns {
+            unsafe { self.$generic::<P::Avx2, $($($n),*)? $($t)?>($($argument),*) }
         }
     };
 }
@@ -59,6 +59,7 @@ use rayon::prelude::*;
 use crate::discretization::BondWeights;
 use crate::family::{Body, Bond, BondKernel, BondStates, Families};
 use crate::field::Number;
+use crate::lane::Lane;
 pub use packs::{Instructions, Packs};
 
 /// Which bonds break: asked only about bonds strained beyond `threshold`, in the strain of the kernel.
@@ -200,6 +201,7 @@ impl Exec {
                     instructions,
                     families,
                     weights,
+                    profile: weights.profile(sites.volume_unit, <P::Baseline as Lane>::SINGLE),
                     sites,
                     states,
                     input,

@@ -84,6 +84,17 @@ macro_rules! numbers {
                 self
             }
             #[inline(always)]
+            fn clamped(mut self) -> Self {
+                for k in 0..N {
+                    self.0[k] = self.0[k].clamp(0.0, 1.0);
+                }
+                self
+            }
+            #[inline(always)]
+            fn total(self) -> $number {
+                (self.0[0] + self.0[2]) + (self.0[1] + self.0[3])
+            }
+            #[inline(always)]
             fn largest(self) -> f64 {
                 let mut largest = self.0[0];
                 for k in 1..N {
@@ -98,10 +109,6 @@ macro_rules! numbers {
             #[inline(always)]
             unsafe fn load(source: *const $number) -> Self {
                 Array(unsafe { source.cast::<[$number; N]>().read_unaligned() })
-            }
-            #[inline(always)]
-            unsafe fn unload(self, target: *mut $number) {
-                unsafe { target.cast::<[$number; N]>().write_unaligned(self.0) }
             }
             #[inline(always)]
             fn inverse_root_guess(mut self) -> Self {

@@ -99,8 +99,23 @@ impl Pack<f64> for F64 {
         }
     }
     #[inline(always)]
+    fn clamped(self) -> Self {
+        unsafe {
+            let (zero, one) = (_mm256_setzero_pd(), _mm256_set1_pd(1.0));
+            F64(self.0.map(|x| _mm256_min_pd(_mm256_max_pd(x, zero), one)))
+        }
+    }
+    #[inline(always)]
     fn largest(self) -> f64 {
         (1..N).fold(self.lane(0), |largest, k| f64::max(largest, self.lane(k)))
+    }
+    #[inline(always)]
+    fn total(self) -> f64 {
+        unsafe {
+            let four = _mm256_add_pd(self.0[0], self.0[1]);
+            let two = _mm_add_pd(_mm256_castpd256_pd128(four), _mm256_extractf128_pd::<1>(four));
+            _mm_cvtsd_f64(_mm_add_sd(two, _mm_unpackhi_pd(two, two)))
+        }
     }
     #[inline(always)]
     fn lane(self, k: usize) -> f64 {
@@ -111,10 +126,6 @@ impl Pack<f64> for F64 {
     #[inline(always)]
     unsafe fn load(source: *const f64) -> Self {
         F64(unsafe { load(source) })
-    }
-    #[inline(always)]
-    unsafe fn unload(self, target: *mut f64) {
-        unsafe { self.store(target) }
     }
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {
@@ -143,8 +154,20 @@ impl Pack<f32> for F32 {
         unsafe { F32(_mm256_max_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), other.0), self.0)) }
     }
     #[inline(always)]
+    fn clamped(self) -> Self {
+        unsafe { F32(_mm256_min_ps(_mm256_max_ps(self.0, _mm256_setzero_ps()), _mm256_set1_ps(1.0))) }
+    }
+    #[inline(always)]
     fn largest(self) -> f64 {
         (1..N).fold(self.lane(0), |largest, k| f64::max(largest, self.lane(k)))
+    }
+    #[inline(always)]
+    fn total(self) -> f32 {
+        unsafe {
+            let four = _mm_add_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+            let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
+        }
     }
     #[inline(always)]
     fn lane(self, k: usize) -> f64 {
@@ -155,10 +178,6 @@ impl Pack<f32> for F32 {
     #[inline(always)]
     unsafe fn load(source: *const f32) -> Self {
         F32(unsafe { _mm256_loadu_ps(source) })
-    }
-    #[inline(always)]
-    unsafe fn unload(self, target: *mut f32) {
-        unsafe { _mm256_storeu_ps(target, self.0) }
     }
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {

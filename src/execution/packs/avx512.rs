@@ -95,16 +95,28 @@ impl Pack<f64> for F64 {
         unsafe { F64([_mm512_range_pd::<LARGER>(a[0], b[0]), _mm512_range_pd::<LARGER>(a[1], b[1])]) }
     }
     #[inline(always)]
+    fn clamped(self) -> Self {
+        unsafe {
+            let (zero, one) = (_mm512_setzero_pd(), _mm512_set1_pd(1.0));
+            F64(self.0.map(|x| _mm512_min_pd(_mm512_max_pd(x, zero), one)))
+        }
+    }
+    #[inline(always)]
     fn largest(self) -> f64 {
         unsafe { _mm512_reduce_max_pd(_mm512_max_pd(self.0[0], self.0[1])) }
     }
     #[inline(always)]
-    unsafe fn load(source: *const f64) -> Self {
-        F64(unsafe { load(source) })
+    fn total(self) -> f64 {
+        unsafe {
+            let eight = _mm512_add_pd(self.0[0], self.0[1]);
+            let four = _mm256_add_pd(_mm512_castpd512_pd256(eight), _mm512_extractf64x4_pd::<1>(eight));
+            let two = _mm_add_pd(_mm256_castpd256_pd128(four), _mm256_extractf128_pd::<1>(four));
+            _mm_cvtsd_f64(_mm_add_sd(two, _mm_unpackhi_pd(two, two)))
+        }
     }
     #[inline(always)]
-    unsafe fn unload(self, target: *mut f64) {
-        unsafe { self.store(target) }
+    unsafe fn load(source: *const f64) -> Self {
+        F64(unsafe { load(source) })
     }
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {
@@ -138,16 +150,25 @@ impl Pack<f32> for F32 {
         unsafe { F32(_mm512_range_ps::<LARGER>(self.0, other.0)) }
     }
     #[inline(always)]
+    fn clamped(self) -> Self {
+        unsafe { F32(_mm512_min_ps(_mm512_max_ps(self.0, _mm512_setzero_ps()), _mm512_set1_ps(1.0))) }
+    }
+    #[inline(always)]
     fn largest(self) -> f64 {
         unsafe { f64::from(_mm512_reduce_max_ps(self.0)) }
     }
     #[inline(always)]
-    unsafe fn load(source: *const f32) -> Self {
-        F32(unsafe { _mm512_loadu_ps(source) })
+    fn total(self) -> f32 {
+        unsafe {
+            let eight = _mm256_add_ps(_mm512_castps512_ps256(self.0), _mm512_extractf32x8_ps::<1>(self.0));
+            let four = _mm_add_ps(_mm256_castps256_ps128(eight), _mm256_extractf128_ps::<1>(eight));
+            let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
+        }
     }
     #[inline(always)]
-    unsafe fn unload(self, target: *mut f32) {
-        unsafe { _mm512_storeu_ps(target, self.0) }
+    unsafe fn load(source: *const f32) -> Self {
+        F32(unsafe { _mm512_loadu_ps(source) })
     }
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {

@@ -80,17 +80,18 @@ pub trait Pack<B: Number>: Lane {
     fn keep(self, mask: u16) -> Self;
     /// The larger of |self| and |other| in each lane; of a number and a NaN, the number.
     fn larger(self, other: Self) -> Self;
+    /// Between zero and one: what lies outside is drawn to the nearer of them.
+    fn clamped(self) -> Self;
     /// The largest lane.
     fn largest(self) -> f64;
+    /// The sum of the lanes: each of the lower half and its fellow of the upper half, and so on with the halves.
+    fn total(self) -> B;
     fn lane(self, k: usize) -> f64;
     /// The numbers at `source`.
     ///
     /// # Safety
     /// As many as there are lanes must stand there.
     unsafe fn load(source: *const B) -> Self;
-    /// # Safety
-    /// There must be room for as many numbers as there are lanes.
-    unsafe fn unload(self, target: *mut B);
     /// 1/√self within 4 % for positive numbers, from their bits.
     fn inverse_root_guess(self) -> Self;
 
