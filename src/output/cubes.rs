@@ -235,8 +235,10 @@ impl Band<'_> {
 
 /// The pixels of a range whose centres lie within `reach` of `centre`.
 fn touched(centre: f64, reach: f64, range: Range<usize>) -> Range<usize> {
-    let first = (centre - reach - 0.5).ceil();
-    let last = (centre + reach - 0.5).floor() + 1.0;
-    // `as` takes what is below zero to zero.
-    (first as usize).clamp(range.start, range.end)..(last as usize).clamp(range.start, range.end)
+    let (low, high) = (centre - reach - 0.5, centre + reach - 0.5);
+    // Up to the next whole number, and down plus one, without the calls that `ceil` and `floor` are. `as` takes what is
+    // below zero to zero.
+    let (first, last) = (low as usize, high as usize);
+    let (first, last) = (first + usize::from((first as f64) < low), last + usize::from(high >= 0.0));
+    first.clamp(range.start, range.end)..last.clamp(range.start, range.end)
 }

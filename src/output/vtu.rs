@@ -251,9 +251,19 @@ fn integers(count: usize, value: impl Fn(usize) -> i64 + Sync) -> Packed {
     })
 }
 
+/// Bytes of a block that are tried first.
+const PROBE: usize = 1 << 14;
+
+/// In zlib's format. The digits of real numbers are mostly noise, which takes long to compress and hardly shrinks: blocks
+/// that begin so are stored as they are.
 fn compressed(bytes: &[u8]) -> Vec<u8> {
-    let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 2), Compression::fast());
-    encoder.write_all(bytes).and_then(|()| encoder.finish()).expect("a Vec takes every byte")
+    let packed = |bytes: &[u8], level| {
+        let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() + 64), level);
+        encoder.write_all(bytes).and_then(|()| encoder.finish()).expect("a Vec takes every byte")
+    };
+    let probe = &bytes[..bytes.len().min(PROBE)];
+    let shrinks = packed(probe, Compression::fast()).len() < probe.len() / 4 * 3;
+    packed(bytes, if shrinks { Compression::fast() } else { Compression::none() })
 }
 
 /// Text that may stand in an XML attribute. Control characters, which XML has no way to write, become `_`.
