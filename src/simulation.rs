@@ -300,6 +300,13 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Source for Model<D, L, P> {
     fn family_sizes(&self) -> Vec<u32> {
         self.problem.state.states.per_point(&self.problem.body)
     }
+    fn bond_words(&self) -> &[u16] {
+        self.problem.state.states.words()
+    }
+    fn bond_ends(&self, bit: usize) -> [[f64; 3]; 2] {
+        let Problem { body, state, .. } = &self.problem;
+        state.states.ends(body, bit).map(|slot| embed(&body.cloud.position(slot)))
+    }
 }
 
 impl<const D: usize, L: BondLaw<D>, P: Packs> Stepper for Model<D, L, P> {
@@ -357,6 +364,12 @@ mod tests {
         }
         fn family_sizes(&self) -> Vec<u32> {
             Vec::new()
+        }
+        fn bond_words(&self) -> &[u16] {
+            &[]
+        }
+        fn bond_ends(&self, _: usize) -> [[f64; 3]; 2] {
+            [[0.0; 3]; 2]
         }
     }
 

@@ -62,6 +62,11 @@ fn a_crack_takes_the_fracture_energy_for_each_new_area() {
 }
 
 #[test]
+fn precisions_break_the_same_bonds() {
+    passes("precision");
+}
+
+#[test]
 fn names_of_studies_are_distinct_and_written_as_on_the_command_line() {
     for (k, study) in STUDIES.iter().enumerate() {
         assert!(study.name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-'), "{}", study.name);

@@ -580,6 +580,7 @@ impl<const D: usize> Builder<'_, D> {
             until: condition.until.unwrap_or(f64::INFINITY),
             reaction: 0.0,
             last: Vec::new(),
+            path: Vec::new(),
         })
     }
 

@@ -42,6 +42,9 @@ pub struct Prescribed {
     pub reaction: f64,
     /// u (m), v (m/s) and force density (N/m³) of each point at the end of the last step.
     pub last: Vec<[f64; 3]>,
+    /// u of each point before it is rounded to the numbers of the field, m: roundings of thousands of equal steps would
+    /// all go the same way.
+    pub path: Vec<f64>,
 }
 
 impl Prescribed {
@@ -55,13 +58,14 @@ impl Prescribed {
             Quantity::Velocity => t + 0.5 * dt,
             Quantity::Displacement => t + dt,
         };
-        for ((&slot, &value), [before, ..]) in self.slots.iter().zip(self.profile.at(at)).zip(&self.last) {
+        for ((&slot, &value), u) in self.slots.iter().zip(self.profile.at(at)).zip(&mut self.path) {
             let v = match self.quantity {
                 Quantity::Velocity => value,
-                Quantity::Displacement => (value - before) / dt,
+                Quantity::Displacement => (value - *u) / dt,
             };
+            *u += dt * v;
             velocity[slot as usize] = T::from_f64(v);
-            displacement[slot as usize] = T::from_f64(before + dt * v);
+            displacement[slot as usize] = T::from_f64(*u);
         }
     }
 
@@ -115,6 +119,7 @@ impl Prescribed {
     pub fn start<T: Number>(&mut self, t: f64, displacement: &mut [T], velocity: &mut [T], force: &[T]) {
         let values = self.profile.at(t);
         self.last.clear();
+        self.path.clear();
         for (&slot, value) in self.slots.iter().zip(values) {
             let slot = slot as usize;
             match self.quantity {
@@ -122,6 +127,7 @@ impl Prescribed {
                 Quantity::Velocity => velocity[slot] = T::from_f64(*value),
             }
             self.last.push([displacement[slot], velocity[slot], force[slot]].map(T::to_f64));
+            self.path.push(displacement[slot].to_f64());
         }
     }
 }

@@ -115,6 +115,23 @@ impl BondStates {
         words
     }
 
+    /// The slots of x and x′ of the bond whose state is bit `bit % 16` of word `bit / 16`.
+    pub fn ends<const D: usize>(&self, body: &Body<D>, bit: usize) -> [usize; 2] {
+        match (self, &body.families, &body.cloud.arrangement) {
+            (BondStates::Lattice(_), Families::Lattice(families), Arrangement::Lattice(lattice)) => {
+                let (word, n) = (bit / BLOCK, families.offsets.len());
+                let slot = lattice.guard + word / n * BLOCK + bit % BLOCK;
+                [slot, slot.wrapping_add_signed(families.offsets[word % n].shift)]
+            }
+            (BondStates::Cloud(_), Families::Cloud(families), _) => {
+                let group = (bit / GROUP) as u64;
+                let point = families.starts.partition_point(|&start| start <= group) - 1;
+                [point, families.neighbours[bit] as usize]
+            }
+            _ => unreachable!("states are built from the families of their body"),
+        }
+    }
+
     /// The words as bytes, for hashing and saving.
     pub fn bytes(&self) -> Vec<u8> {
         self.words().iter().flat_map(|w| w.to_le_bytes()).collect()
@@ -184,5 +201,29 @@ mod tests {
         let whole = BondStates::whole(&body);
         assert_eq!(whole.count(), BondStates::whole(&same).count());
         assert_eq!(whole.count() % 2, 0);
+    }
+
+    #[test]
+    fn a_bit_is_the_same_bond_at_both_ends_and_on_a_lattice_and_its_cloud() {
+        let ball = Shape::Ball { center: [0.0; 3], radius: 1.0 };
+        let body = Body::new(Cloud::lattice(&ball, 0.2, 3), 0.5, 0.5..0.5 * (1.0 + 1e-9), |_| true);
+        let positions: Vec<[f64; 3]> = body.cloud.slots.iter().map(|&s| body.cloud.position(s as usize)).collect();
+        let volumes = vec![0.2f64.powi(3); positions.len()];
+        let same = Body::new(Cloud::scattered(positions, volumes), 0.5, 0.5..0.5 * (1.0 + 1e-9), |_| true);
+        let bonds = |body: &Body<3>, swapped: bool| {
+            let whole = BondStates::whole(body);
+            let set = (0..16 * whole.words().len()).filter(|bit| whole.words()[bit / 16] >> (bit % 16) & 1 == 1);
+            let ends = |bit| {
+                let [a, b] = whole.ends(body, bit).map(|slot| body.cloud.position(slot).map(f64::to_bits));
+                if swapped { [b, a] } else { [a, b] }
+            };
+            let mut bonds: Vec<_> = set.map(ends).collect();
+            bonds.sort_unstable();
+            bonds
+        };
+        let all = bonds(&body, false);
+        assert_eq!(all, bonds(&body, true));
+        assert_eq!(all, bonds(&same, false));
+        assert!(all.windows(2).all(|pair| pair[0] != pair[1]), "a bond has one bit at each end");
     }
 }

@@ -28,6 +28,12 @@ pub trait Source {
     fn hash(&self) -> String;
     /// Bonds of each point that hold now, in point order.
     fn family_sizes(&self) -> Vec<u32>;
+    /// The state of every bond: bits, set while it holds, one at each of its ends. Their order follows from the points,
+    /// the horizon and the rule of partial volumes alone, so that cases which share these have the same bond at the same
+    /// bit, whatever their precision.
+    fn bond_words(&self) -> &[u16];
+    /// x and x′ (m) of the bond whose state is bit `bit % 16` of word `bit / 16`.
+    fn bond_ends(&self, bit: usize) -> [[f64; 3]; 2];
 }
 
 pub use super::picture::Sizes;

@@ -60,7 +60,7 @@ struct Curves {
 }
 
 pub fn run(_full: bool) -> Result<Outcome> {
-    let mut simulation = bundled_simulation("crack_branching")?;
+    let mut simulation = bundled_simulation("crack_branching", &[])?;
     let mut outcome = Outcome::default();
     let facts = simulation.model.facts().clone();
     outcome.rows.extend([

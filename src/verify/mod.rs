@@ -13,6 +13,7 @@ pub mod exact;
 mod family_counts;
 mod fracture_work;
 mod navier;
+mod precision;
 mod wave;
 
 use serde::Serialize;
@@ -76,6 +77,7 @@ pub const STUDIES: &[Study] = &[
         heavy: false,
         run: fracture_work::run,
     },
+    precision::PRECISION,
 ];
 
 /// The study of that name.
@@ -163,9 +165,9 @@ fn simulation(name: &str, text: &str, overrides: &[(&str, &str)]) -> Result<Simu
     build(&case, &Options::default())
 }
 
-/// A bundled case, ready to be stepped.
-fn bundled_simulation(name: &str) -> Result<Simulation> {
+/// A bundled case with other values of some keys, ready to be stepped.
+fn bundled_simulation(name: &str, overrides: &[(&str, &str)]) -> Result<Simulation> {
     let case = bundled::CASES.iter().find(|case| case.name == name);
     let case = case.ok_or_else(|| Error::Refused(format!("no bundled case is called `{name}`")))?;
-    simulation(name, case.case, &[])
+    simulation(name, case.case, overrides)
 }
