@@ -3,6 +3,8 @@
 //! It also keeps the books: work and impulse of everything from outside, energy lost to broken bonds and damping, so
 //! that a wrong run is seen at once.
 
+mod rest;
+
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -16,7 +18,7 @@ use crate::field::{Double, Field, Number, Precision, Values, components, compone
 use crate::geometry::Arrangement;
 use crate::physics::elasticity::{Elasticity, State};
 use crate::physics::failure::CriticalStretch;
-use crate::solver::{Clock, Stage, System, Unknowns, VelocityVerlet};
+use crate::solver::{Clock, Solver, Stage, System, Unknowns};
 
 /// One body, what it is made of, what acts on it, and where it stands.
 pub struct Problem<const D: usize, L, P: Precision = Double> {
@@ -34,6 +36,9 @@ pub struct Problem<const D: usize, L, P: Precision = Double> {
     ledger: Ledger,
     /// c of the solver in use, 1/s: the books need it.
     damping: f64,
+    /// Whether a static solver advances it: the body starts without motion, and prescribed values are the solver's to
+    /// impose.
+    pub is_static: bool,
 }
 
 /// What came in and what was lost since the start.
@@ -99,11 +104,29 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         physics.bonded_volume(&body, &mut exec, &BondStates::whole(&body), &mut family_volume);
         let family_volume = family_volume.into_iter().map(P::Field::from_f64).collect();
         let ledger = Ledger::default();
-        Problem { body, physics, state, prescribed, loads, family_volume, n_bonds, n_cut, exec, ledger, damping: 0.0 }
+        Problem {
+            body,
+            physics,
+            state,
+            prescribed,
+            loads,
+            family_volume,
+            n_bonds,
+            n_cut,
+            exec,
+            ledger,
+            damping: 0.0,
+            is_static: false,
+        }
     }
 
     /// Evaluates the forces at the start and opens the books.
     pub fn start(&mut self) {
+        if self.is_static {
+            self.state.velocity.fill(P::Field::default());
+            self.ledger.initial = self.balance().strain;
+            return;
+        }
         for p in &mut self.prescribed {
             let c = p.component;
             let [u, v] = [&mut self.state.displacement, &mut self.state.velocity];
@@ -131,8 +154,12 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         self.ledger.momentum = now.momentum;
     }
 
-    /// One step of velocity Verlet, then the watch over its result.
-    pub fn step(&mut self, solver: &VelocityVerlet, clock: &mut Clock) -> Result<()> {
+    /// One step: of velocity Verlet, then the watch over its result; or a load step of a static solver.
+    pub fn step(&mut self, solver: &Solver, clock: &mut Clock) -> Result<()> {
+        let solver = match solver {
+            Solver::VelocityVerlet(solver) => solver,
+            Solver::Statics(statics) => return self.settle(statics, clock),
+        };
         self.damping = solver.damping;
         solver.step(self, clock);
         let (kinetic, momentum) = self.motion();

@@ -19,19 +19,19 @@ use crate::output::source::{Facts, Points, Source};
 use crate::output::writer::{Order, Output};
 use crate::output::writer_thread::{Batch, WriterThread};
 use crate::problem::{Balance, Problem};
-use crate::solver::{Clock, VelocityVerlet};
+use crate::solver::{Clock, Solver};
 
 /// A model that can be stepped and looked at: a [`Problem`] whose dimension and law are no longer types.
 pub trait Stepper: Source + Send {
     fn start(&mut self);
-    fn step(&mut self, solver: &VelocityVerlet, clock: &mut Clock) -> Result<()>;
+    fn step(&mut self, solver: &Solver, clock: &mut Clock) -> Result<()>;
 }
 
 /// A case that is ready to run.
 pub struct Simulation {
     pub title: String,
     pub model: Box<dyn Stepper>,
-    pub solver: VelocityVerlet,
+    pub solver: Solver,
     pub clock: Clock,
     pub n_steps: u64,
     pub history: History,
@@ -313,7 +313,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Stepper for Model<D, L, P> {
     fn start(&mut self) {
         self.problem.start();
     }
-    fn step(&mut self, solver: &VelocityVerlet, clock: &mut Clock) -> Result<()> {
+    fn step(&mut self, solver: &Solver, clock: &mut Clock) -> Result<()> {
         self.problem.step(solver, clock)
     }
 }
@@ -326,6 +326,7 @@ mod tests {
     use crate::output::schedule::Schedule;
     use crate::output::snapshot::{Snapshot, Wants};
     use crate::output::writer::Writer;
+    use crate::solver::VelocityVerlet;
     use std::sync::Mutex;
 
     /// A model that does nothing until it stops on numbers, and counts how often its field is computed.
@@ -375,7 +376,7 @@ mod tests {
 
     impl Stepper for Still {
         fn start(&mut self) {}
-        fn step(&mut self, _: &VelocityVerlet, clock: &mut Clock) -> Result<()> {
+        fn step(&mut self, _: &Solver, clock: &mut Clock) -> Result<()> {
             clock.step += 1;
             let (step, time) = (clock.step, clock.time());
             let stop = NumericalStop { step, time, field: "velocity", value: f64::NAN, point: None, cause: "".into() };
@@ -438,7 +439,7 @@ mod tests {
         let simulation = Simulation {
             title: String::new(),
             model: Box::new(Still { points, stops_at, computed: 0 }),
-            solver: VelocityVerlet { damping: 0.0 },
+            solver: Solver::VelocityVerlet(VelocityVerlet { damping: 0.0 }),
             clock: Clock { step: 0, dt: 1.0 },
             n_steps: 20,
             history: History::new(folder.join("history.csv"), 5, None),

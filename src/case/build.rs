@@ -14,7 +14,7 @@ use super::diagnostics::{Diagnostic, Severity};
 use super::import;
 use super::model::{
     self, Axis, BondBased, Case, FieldName, Formula, InfluenceFunction, Law, Motion, Output, PartialVolumes, Plane,
-    Precision, Region, Solver,
+    Precision, Region,
 };
 use super::read::{Located, Source};
 use crate::conditions::load::Scale;
@@ -43,7 +43,10 @@ use crate::physics::failure::CriticalStretch;
 use crate::physics::failure::critical_stretch::PairRule;
 use crate::problem::Problem;
 use crate::simulation::{Model, Simulation, Stepper};
-use crate::solver::{Clock, VelocityVerlet};
+use crate::solver::dynamic_relaxation::DynamicRelaxation;
+use crate::solver::newton::Newton;
+use crate::solver::statics::Method;
+use crate::solver::{Clock, Solver, Statics, VelocityVerlet};
 
 /// How a case is to be run, beside what it says itself.
 #[derive(Debug, Clone, Default)]
@@ -190,7 +193,8 @@ impl<const D: usize> Builder<'_, D> {
             critical_stretch: smallest,
             memory: 0,
         };
-        let problem = Problem::new(body, physics, state, prescribed, loads, n_cut);
+        let mut problem = Problem::new(body, physics, state, prescribed, loads, n_cut);
+        problem.is_static = !matches!(self.case.value.solver, model::Solver::VelocityVerlet(_));
         let model = Model::new(problem, facts);
         self.finish(Box::new(model))
     }
@@ -199,30 +203,7 @@ impl<const D: usize> Builder<'_, D> {
     fn finish(&self, model: Box<dyn Stepper>) -> Result<Simulation> {
         let case = &self.case.value;
         let facts = model.facts().clone();
-        let Solver::VelocityVerlet(solver) = &case.solver;
-        let (dt, n_steps) = match solver.time_step {
-            Some(dt) => {
-                if dt > facts.stable_step {
-                    let message = format!(
-                        "the time step is above the stable step {:.4e} s of this discretisation",
-                        facts.stable_step
-                    );
-                    let help = "give a smaller one, or `safety = 0.8` instead of `time_step`";
-                    return Err(self.refuse("solver.velocity_verlet.time_step", message, help));
-                }
-                (dt, (solver.end_time / dt - 1e-9).ceil().max(1.0))
-            }
-            None => {
-                let n = (solver.end_time / (facts.stable_step * solver.safety.unwrap_or(SAFETY))).ceil().max(1.0);
-                (solver.end_time / n, n)
-            }
-        };
-        if n_steps > MANY_STEPS {
-            let message =
-                format!("this would take {n_steps:.3e} steps of {dt:.3e} s; at most {MANY_STEPS:.0e} are taken");
-            return Err(self.refuse("solver.velocity_verlet.end_time", message, "is the unit right?"));
-        }
-        let n_steps = n_steps as u64;
+        let (solver, dt, n_steps) = self.solver(facts.stable_step)?;
         let folder = &self.options.folder;
         let mut outputs = Vec::new();
         let mut every = HISTORY_EVERY;
@@ -272,7 +253,7 @@ impl<const D: usize> Builder<'_, D> {
         Ok(Simulation {
             title: case.case.title.clone(),
             model,
-            solver: VelocityVerlet { damping: solver.damping },
+            solver,
             clock: Clock { step: 0, dt },
             n_steps,
             history: History::new(folder.join("history.csv"), every, tip),
@@ -281,6 +262,55 @@ impl<const D: usize> Builder<'_, D> {
             threads: rayon::current_num_threads(),
             setup_seconds: 0.0,
         })
+    }
+
+    /// The solver, its step (s), and how many it takes.
+    fn solver(&self, stable_step: f64) -> Result<(Solver, f64, u64)> {
+        let newton = |s: &model::Statics| {
+            let (tolerance, max_iterations, max_linear) = (s.tolerance, s.max_iterations, s.max_linear);
+            Method::Newton(Newton { tolerance, max_iterations, max_linear })
+        };
+        let statics = |method, linearised, breaking, end_time: f64, steps: u64| {
+            let solver = Solver::Statics(Statics { method, linearised, breaking });
+            Ok((solver, end_time / steps as f64, steps))
+        };
+        match &self.case.value.solver {
+            model::Solver::VelocityVerlet(solver) => {
+                let (dt, n_steps) = self.time_steps(solver, stable_step)?;
+                Ok((Solver::VelocityVerlet(VelocityVerlet { damping: solver.damping }), dt, n_steps))
+            }
+            model::Solver::Static(s) => statics(newton(s), true, false, s.end_time, s.steps),
+            model::Solver::Newton(s) => statics(newton(s), false, false, s.end_time, s.steps),
+            model::Solver::QuasiStatic(s) => statics(newton(s), false, true, s.end_time, s.steps),
+            model::Solver::DynamicRelaxation(s) => {
+                let method = DynamicRelaxation { tolerance: s.tolerance, max_iterations: s.max_iterations };
+                statics(Method::DynamicRelaxation(method), false, false, s.end_time, s.steps)
+            }
+        }
+    }
+
+    fn time_steps(&self, solver: &model::VelocityVerlet, stable_step: f64) -> Result<(f64, u64)> {
+        let (dt, n_steps) = match solver.time_step {
+            Some(dt) => {
+                if dt > stable_step {
+                    let message =
+                        format!("the time step is above the stable step {stable_step:.4e} s of this discretisation");
+                    let help = "give a smaller one, or `safety = 0.8` instead of `time_step`";
+                    return Err(self.refuse("solver.velocity_verlet.time_step", message, help));
+                }
+                (dt, (solver.end_time / dt - 1e-9).ceil().max(1.0))
+            }
+            None => {
+                let n = (solver.end_time / (stable_step * solver.safety.unwrap_or(SAFETY))).ceil().max(1.0);
+                (solver.end_time / n, n)
+            }
+        };
+        if n_steps > MANY_STEPS {
+            let message =
+                format!("this would take {n_steps:.3e} steps of {dt:.3e} s; at most {MANY_STEPS:.0e} are taken");
+            return Err(self.refuse("solver.velocity_verlet.end_time", message, "is the unit right?"));
+        }
+        Ok((dt, n_steps as u64))
     }
 
     fn files(&self, schedule: &Schedule, n_steps: u64, dt: f64, path: &str) -> Result<()> {

@@ -111,8 +111,10 @@ impl Checker<'_> {
                 _ => {}
             }
         }
-        let Solver::VelocityVerlet(solver) = &case.solver;
-        if solver.safety.is_some() && solver.time_step.is_some() {
+        if let Solver::VelocityVerlet(solver) = &case.solver
+            && solver.safety.is_some()
+            && solver.time_step.is_some()
+        {
             let path = "solver.velocity_verlet.time_step";
             self.error(path, "`safety` and `time_step` are both given; only one may be", "remove one of them");
         }

@@ -507,12 +507,86 @@ pub enum Load {
     },
 }
 
-/// How time advances.
+/// How time advances, or how the body comes to rest. The static solvers take load steps: time is what conditions are
+/// given in, and nothing moves by itself.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Solver {
     /// Explicit, second order.
     VelocityVerlet(VelocityVerlet),
+    /// Equilibrium at small displacements: the law linearised at rest. No bond breaks.
+    Static(Statics),
+    /// Equilibrium of the law as it is, by Newton's method. No bond breaks.
+    Newton(Statics),
+    /// The same by motion that dies out: no linear system is solved.
+    DynamicRelaxation(Relaxation),
+    /// Newton's method, and overstrained bonds break, the worst first, until none is left; load steps are cut where no
+    /// equilibrium is found.
+    QuasiStatic(Statics),
+}
+
+/// Parameters of static solvers.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Statics {
+    /// Time at the end of the last load step; 1 s if not given.
+    #[serde(default = "one")]
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
+    pub end_time: f64,
+    /// Load steps, of the same length.
+    #[serde(default = "one_step")]
+    #[schemars(range(min = 1))]
+    pub steps: u64,
+    /// At rest when forces out of balance are at most this share of loads or reactions.
+    #[serde(default = "balanced")]
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 0.01))]
+    pub tolerance: f64,
+    /// Iterations of Newton's method in a load step.
+    #[serde(default = "newton_iterations")]
+    #[schemars(range(min = 1))]
+    pub max_iterations: usize,
+    /// Iterations of conjugate gradients in each of these.
+    #[serde(default = "many_iterations")]
+    #[schemars(range(min = 1))]
+    pub max_linear: usize,
+}
+
+/// Parameters of dynamic relaxation.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Relaxation {
+    /// Time at the end of the last load step; 1 s if not given.
+    #[serde(default = "one")]
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
+    pub end_time: f64,
+    /// Load steps, of the same length.
+    #[serde(default = "one_step")]
+    #[schemars(range(min = 1))]
+    pub steps: u64,
+    /// At rest when forces out of balance are at most this share of loads or reactions.
+    #[serde(default = "balanced")]
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 0.01))]
+    pub tolerance: f64,
+    /// Steps of the motion in a load step.
+    #[serde(default = "many_iterations")]
+    #[schemars(range(min = 1))]
+    pub max_iterations: usize,
+}
+
+fn one_step() -> u64 {
+    1
+}
+
+fn balanced() -> f64 {
+    1e-8
+}
+
+fn newton_iterations() -> usize {
+    50
+}
+
+fn many_iterations() -> usize {
+    100_000
 }
 
 /// Parameters of velocity Verlet.

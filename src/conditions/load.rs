@@ -30,6 +30,16 @@ pub enum Scale {
     ByPoint(Vec<f64>),
 }
 
+impl Scale {
+    /// Of point `k` of the set.
+    fn of(&self, k: usize) -> f64 {
+        match self {
+            Scale::Same(s) => *s,
+            Scale::ByPoint(s) => s[k],
+        }
+    }
+}
+
 /// The state of a load at the last evaluation.
 #[derive(Debug, Clone)]
 pub struct Last {
@@ -45,6 +55,17 @@ pub struct Done {
 }
 
 impl Load {
+    /// Calls `visit` with each slot of the set and b(x, t) there, N/m³.
+    pub fn each(&mut self, t: f64, mut visit: impl FnMut(usize, f64)) {
+        if t > self.until {
+            return;
+        }
+        let (scale, slots) = (&self.scale, &self.slots);
+        for (k, (&slot, value)) in slots.iter().zip(self.profile.at(t)).enumerate() {
+            visit(slot as usize, scale.of(k) * value);
+        }
+    }
+
     /// Adds b(x, t) to one component of the force density, and returns the work and impulse since the last call, by
     /// the trapezoidal rule in time, which is what velocity Verlet does to momentum and, to second order, to energy.
     pub fn apply<T: Number>(
@@ -65,11 +86,7 @@ impl Load {
         });
         for (k, &slot) in self.slots.iter().enumerate() {
             let slot = slot as usize;
-            let scale = match &self.scale {
-                Scale::Same(s) => *s,
-                Scale::ByPoint(s) => s[k],
-            };
-            let b = if active { scale * values[k] } else { 0.0 };
+            let b = if active { self.scale.of(k) * values[k] } else { 0.0 };
             let u = displacement[slot].to_f64();
             if !first {
                 let mean = 0.5 * (last.force[k] + b) * volume(slot);

@@ -1,10 +1,23 @@
-//! How time advances. A solver sees flat vectors and a right-hand side, never a point, a bond or a material.
+//! How time advances, and how bodies come to rest. A solver sees flat vectors and a right-hand side, never a point, a bond or a material.
 
+pub mod dynamic_relaxation;
+pub mod newton;
+pub mod statics;
 pub mod velocity_verlet;
 
+pub use bondwise_linear as linear;
+pub use statics::Statics;
 pub use velocity_verlet::VelocityVerlet;
 
 use crate::field::Number;
+
+/// How a problem is advanced by a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Solver {
+    VelocityVerlet(VelocityVerlet),
+    /// A step is a load step, and time only what conditions are given in.
+    Statics(Statics),
+}
 
 /// The vectors that a solver of second order advances: ρ ü = force − ρ c u̇.
 pub struct Unknowns<'a, T> {

@@ -59,19 +59,61 @@ impl<L> Elasticity<L> {
     where
         L: BondLaw<D>,
     {
-        let kernel = Force(self.law);
-        let weights = &self.operator.weights;
         let (input, output) = (components::<D, _>(&state.displacement), components_mut::<D, _>(&mut state.force));
         let Some(failure) = &self.failure else {
-            exec.sum_bonds::<D, D, D, P>(body, weights, &state.states, input, output, &kernel);
-            return;
+            return self.force_density::<D, P>(body, exec, &state.states, input, output);
         };
         let (law, velocity) = (self.law, components::<D, _>(&state.velocity));
         let rule = Breaking::<D, L, P::Field> { failure, law, displacement: input, velocity, dt };
-        let states = &mut state.states;
-        let now = exec.sum_bonds_and_break::<D, D, D, P>(body, weights, states, input, output, &kernel, &rule);
+        let now = self.break_by::<D, P>(body, exec, &mut state.states, input, output, &rule);
         state.broken.bonds += now.bonds;
         state.broken.energy += now.energy;
+    }
+
+    /// Internal force density (N/m³) at given displacements; no bond breaks.
+    pub fn force_density<const D: usize, P: Packs>(
+        &self,
+        body: &Body<D>,
+        exec: &mut Exec,
+        states: &BondStates,
+        displacement: [&[P::Field]; D],
+        force: [&mut [P::Field]; D],
+    ) where
+        L: BondLaw<D>,
+    {
+        let weights = &self.operator.weights;
+        exec.sum_bonds::<D, D, D, P>(body, weights, states, displacement, force, &Force(self.law));
+    }
+
+    /// The same, after the bonds that `rule` breaks at these displacements are broken.
+    pub fn break_by<const D: usize, P: Packs>(
+        &self,
+        body: &Body<D>,
+        exec: &mut Exec,
+        states: &mut BondStates,
+        displacement: [&[P::Field]; D],
+        force: [&mut [P::Field]; D],
+        rule: &impl BreakRule<D>,
+    ) -> Broken
+    where
+        L: BondLaw<D>,
+    {
+        let (weights, kernel) = (&self.operator.weights, Force(self.law));
+        exec.sum_bonds_and_break::<D, D, D, P>(body, weights, states, displacement, force, &kernel, rule)
+    }
+
+    /// Diagonal of the stiffness at rest, Σ k e_d² β V′ with e = ξ/|ξ| (N/m⁴), by slot and component.
+    pub fn diagonal<const D: usize>(
+        &self,
+        body: &Body<D>,
+        exec: &mut Exec,
+        states: &BondStates,
+        diagonal: [&mut [f64]; D],
+    ) where
+        L: BondLaw<D>,
+    {
+        let (weights, kernel) = (&self.operator.weights, Diagonal(self.law));
+        exec.sum_bonds::<D, 0, D, Double>(body, weights, states, [], diagonal, &kernel);
     }
 
     /// Strain energy density at each slot, W = ½ Σ w β V′ (J/m³); eq. (9).
@@ -179,6 +221,26 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 1> for Tangent<B> {
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
         [sum + self.0.tangent(bond.length, bond.weight)]
+    }
+}
+
+/// Σ k e_d²
+struct Diagonal<L>(L);
+
+impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for Diagonal<B> {
+    const RELATIVE: bool = false;
+
+    #[inline(always)]
+    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
+        L::splat(0.0)
+    }
+    #[inline(always)]
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; D]) -> [L; D] {
+        let spring = self.0.tangent(bond.length, bond.weight) * bond.inverse_square;
+        for d in 0..D {
+            sum[d] = (bond.xi[d] * bond.xi[d]).mul_add(spring, sum[d]);
+        }
+        sum
     }
 }
 
