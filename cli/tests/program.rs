@@ -438,6 +438,18 @@ fn a_wrong_command_line_is_a_matter_of_usage() {
     }
 }
 
+#[test]
+fn an_influence_function_is_for_studies_that_take_one() {
+    let place = Place::new("influence");
+    for (study, name, answer) in
+        [("navier", "constant", "these do: convergence-1d"), ("table-4", "constnt", "did you mean `constant`?")]
+    {
+        let (code, out, error) = place.call(&["verify", study, "--influence", name]);
+        assert_eq!((code, out.as_str()), (2, ""), "{error}");
+        assert!(error.contains(answer), "{error}");
+    }
+}
+
 /// Rows of a quick benchmark.
 fn benchmark(place: &Place, args: &[&str]) -> Vec<Value> {
     let (code, out, error) = place.call(&[&["bench"], args, &["--size", "12", "--json"]].concat());

@@ -111,6 +111,16 @@ impl Checker<'_> {
                 _ => {}
             }
         }
+        let unbroken = match &case.solver {
+            Solver::Static(_) => Some("static"),
+            Solver::Newton(_) => Some("newton"),
+            Solver::DynamicRelaxation(_) => Some("dynamic_relaxation"),
+            Solver::VelocityVerlet(_) | Solver::QuasiStatic(_) => None,
+        };
+        if let Some(name) = unbroken.filter(|_| case.physics.elasticity.failure.is_some()) {
+            let message = format!("no bond breaks in `solver.{name}`; they do in `quasi_static` and `velocity_verlet`");
+            self.warning(&format!("solver.{name}"), message);
+        }
         if let Solver::VelocityVerlet(solver) = &case.solver
             && solver.safety.is_some()
             && solver.time_step.is_some()

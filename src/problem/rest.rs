@@ -233,18 +233,19 @@ impl<'a, const D: usize, L: BondLaw<D>> Rest<'a, D, L> {
         }
     }
 
-    /// Breaks the bonds that are strained worst: those beyond half of the largest excess over the critical strain.
-    pub fn break_worst(&mut self, failure: &CriticalStretch) -> Broken {
+    /// The largest strain of a bond over its critical strain; 0 where all are below it.
+    fn worst(&mut self, failure: &CriticalStretch) -> f64 {
         let largest = AtomicU64::new(0);
-        self.break_beyond(failure, f64::INFINITY, &largest);
-        let largest = f64::from_bits(largest.into_inner());
-        if largest <= 1.0 {
-            return Broken::default();
-        }
-        self.break_beyond(failure, 0.5 * (1.0 + largest), &AtomicU64::new(0))
+        self.break_where(failure, f64::INFINITY, &largest);
+        f64::from_bits(largest.into_inner())
     }
 
-    fn break_beyond(&mut self, failure: &CriticalStretch, limit: f64, largest: &AtomicU64) -> Broken {
+    /// Breaks the bonds that are strained beyond `limit` times their critical strain.
+    fn break_beyond(&mut self, failure: &CriticalStretch, limit: f64) -> Broken {
+        self.break_where(failure, limit, &AtomicU64::new(0))
+    }
+
+    fn break_where(&mut self, failure: &CriticalStretch, limit: f64, largest: &AtomicU64) -> Broken {
         let mut force = std::mem::take(&mut self.scratch[0]);
         let (input, output) = (components::<D, _>(&self.displacement), components_mut::<D, _>(&mut force));
         let rule = Overstrained { failure, law: self.physics.law, displacement: input, limit, largest };
@@ -274,13 +275,21 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         while rest.time < end && failed.is_none() {
             let next = if rest.time + 1.001 * step < end { rest.time + step } else { end };
             let (saved, before) = (rest.saved(), books.clone());
-            if let Err(unrest) = books.advance(&mut rest, statics, failure, next) {
-                rest.restore(saved);
-                books = before;
-                step = 0.5 * (next - rest.time);
-                if step < SMALLEST_STEP * (end - start) {
+            let divisible = 0.5 * (next - rest.time) >= SMALLEST_STEP * (end - start);
+            match books.advance(&mut rest, statics, failure, next, divisible) {
+                Ok(true) => step *= 2.0,
+                // Too far, or not at all: once more, half as far.
+                Ok(false) | Err(_) if divisible => {
+                    rest.restore(saved);
+                    books = before;
+                    step = 0.5 * (next - rest.time);
+                }
+                Err(unrest) => {
+                    rest.restore(saved);
+                    books = before;
                     failed = Some((rest.time, unrest));
                 }
+                Ok(false) => unreachable!("only a step that can be divided goes too far"),
             }
         }
         rest.react(&books.state);
@@ -302,7 +311,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         match failed {
             None => Ok(()),
             Some((time, unrest)) => {
-                let cause = format!("{unrest}; a load step of a {:.0}th did no better", 1.0 / SMALLEST_STEP);
+                let cause = format!("{unrest}; a load step {:.0} times smaller did no better", 1.0 / SMALLEST_STEP);
                 let (field, value, step) = ("equilibrium", f64::NAN, clock.step);
                 Err(Error::Numbers(Box::new(NumericalStop { step, time, field, value, point: None, cause })))
             }
@@ -311,7 +320,12 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
 }
 
 /// Of a load step: smaller ones are not tried.
-const SMALLEST_STEP: f64 = 1.0 / 256.0;
+const SMALLEST_STEP: f64 = 1.0 / 1024.0;
+/// By how much a load step may strain bonds beyond their critical strain before the first of them breaks: they hold twice
+/// this share of energy too much.
+const EXCESS: f64 = 0.005;
+/// Bonds break together whose excess is more than this share of the largest.
+const WORST: f64 = 0.5;
 
 /// The books of a load step.
 #[derive(Clone)]
@@ -326,14 +340,17 @@ impl Books {
         Books { state: rest.resting(), work: Work::default(), broken: Broken::default() }
     }
 
-    /// Brings the body to rest at time `t`, bonds broken until none is overstrained.
+    /// Brings the body to rest at time `t`, bonds broken until none is overstrained. False when the step is
+    /// `divisible`, and went so far that bonds are strained well beyond where they should have broken.
     fn advance<const D: usize, L: BondLaw<D>>(
         &mut self,
         rest: &mut Rest<'_, D, L>,
         statics: &Statics,
         failure: Option<&CriticalStretch>,
         t: f64,
-    ) -> Result<(), Unrest> {
+        divisible: bool,
+    ) -> Result<bool, Unrest> {
+        let mut first = true;
         loop {
             statics.solve(rest, t)?;
             rest.time = t;
@@ -342,10 +359,16 @@ impl Books {
             self.state = state;
             self.work.external += work.external;
             self.work.lost += work.lost;
-            let broken = failure.map_or(Broken::default(), |failure| rest.break_worst(failure));
-            if broken.bonds == 0 {
-                return Ok(());
+            let Some(failure) = failure else { return Ok(true) };
+            let worst = rest.worst(failure);
+            if worst <= 1.0 {
+                return Ok(true);
             }
+            if first && divisible && worst > 1.0 + EXCESS {
+                return Ok(false);
+            }
+            first = false;
+            let broken = rest.break_beyond(failure, 1.0 + WORST * (worst - 1.0));
             self.broken.bonds += broken.bonds;
             self.broken.energy += broken.energy;
             self.state = rest.resting();
@@ -477,7 +500,8 @@ impl<const D: usize, L: BondLaw<D>> Equilibrium for Rest<'_, D, L> {
         // The combinations of motions that leave every held unknown where it is: motions are made independent on the
         // held unknowns, one after the other; what is left of one that depends on those before it is such a combination.
         let count = D + planes.len();
-        let (mut independent, mut free): (Vec<(Vec<f64>, Vec<f64>)>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+        let mut independent: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+        let mut free = Vec::new();
         for m in 0..count {
             let mut weights = vec![0.0; count];
             weights[m] = 1.0;
