@@ -72,6 +72,11 @@ fn a_crack_that_grows_in_equilibrium_takes_the_fracture_energy() {
 }
 
 #[test]
+fn a_plate_with_a_hole_is_strained_as_kirsch_says() {
+    passes("kirsch");
+}
+
+#[test]
 fn the_seven_nodes_have_the_printed_matrix() {
     passes("bar-7-nodes");
 }

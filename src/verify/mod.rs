@@ -14,6 +14,7 @@ mod energy_drift;
 pub mod exact;
 mod family_counts;
 mod fracture_work;
+mod kirsch;
 mod navier;
 mod precision;
 mod wave;
@@ -81,6 +82,7 @@ pub const STUDIES: &[Study] = &[
     },
     precision::PRECISION,
     double_cantilever::STUDY,
+    kirsch::STUDY,
     bar::SEVEN_NODES,
     bar::CONVERGENCE,
     bar::TABLE_1,
