@@ -311,8 +311,8 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         match failed {
             None => Ok(()),
             Some((time, unrest)) => {
-                let cause = format!("{unrest}; a load step {:.0} times smaller did no better", 1.0 / SMALLEST_STEP);
-                let (field, value, step) = ("equilibrium", f64::NAN, clock.step);
+                let cause = format!("{unrest} (load steps down to 1/{:.0} did no better)", 1.0 / SMALLEST_STEP);
+                let (field, value, step) = ("the imbalance of forces over loads", unrest.imbalance(), clock.step);
                 Err(Error::Numbers(Box::new(NumericalStop { step, time, field, value, point: None, cause })))
             }
         }

@@ -52,7 +52,8 @@ pub struct Rested {
 /// Why a body did not come to rest.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unrest {
-    #[error("the body can move as a whole, and the loads push it: {:.2} % of them are balanced by nothing", 100.0 * .0)]
+    /// The share of |loads| along rigid motions.
+    #[error("the body can move as a whole, and nothing balances what the loads add up to: hold it, or balance them")]
     Unbalanced(f64),
     #[error(
         "no equilibrium was found in {iterations} iterations; forces are out of balance by {residual:.3e} of the loads"
@@ -66,6 +67,18 @@ pub enum Unrest {
     NotFinite,
     #[error("{0}")]
     Linear(#[from] LinearError),
+}
+
+impl Unrest {
+    /// What was left of the loads, as far as it is known.
+    pub fn imbalance(&self) -> f64 {
+        match self {
+            Unrest::Unbalanced(share) => *share,
+            Unrest::Iterations { residual, .. } | Unrest::Search(residual) => *residual,
+            Unrest::Linear(LinearError::Stopped { residual, .. }) => *residual,
+            Unrest::NotFinite | Unrest::Linear(_) => f64::NAN,
+        }
+    }
 }
 
 /// Share of the loads that may be balanced by nothing: rounding of sums over a body leaves less.
