@@ -8,6 +8,7 @@
 //!
 //! - [`simulation`]: the event loop; [`problem`]: one body, its physics, its books.
 //! - [`geometry`] and [`family`] own x, x′ and ξ; [`discretization`] owns w; [`physics`] owns f and μ.
+//! - [`refinement`] splits and merges the cells of x where the solution asks for it.
 //! - [`execution`] owns Σ: the only loops over bonds. [`lane`] is the number that a law is written on.
 //! - [`conditions`] own values and loads from outside; [`solver`] owns t; [`output`] only looks.
 //! - [`case`] turns a file into a [`simulation::Simulation`]; [`verify`] proves that all of it is right.
@@ -25,6 +26,7 @@ pub mod lane;
 pub mod output;
 pub mod physics;
 pub mod problem;
+pub mod refinement;
 pub mod simulation;
 pub mod solver;
 pub mod verify;

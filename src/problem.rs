@@ -3,12 +3,16 @@
 //! It also keeps the books: work and impulse of everything from outside, energy lost to broken bonds and damping, so
 //! that a wrong run is seen at once.
 
+pub mod adapt;
 mod rest;
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
+pub use adapt::{Adaptation, Adapted};
+
+use crate::conditions::load::Done;
 use crate::conditions::prescribed::Step;
 use crate::conditions::{Load, Prescribed};
 use crate::error::{Error, NumericalStop, Result};
@@ -18,7 +22,9 @@ use crate::field::{Double, Field, Number, Precision, Values, components, compone
 use crate::geometry::Arrangement;
 use crate::physics::elasticity::{Elasticity, State};
 use crate::physics::failure::CriticalStretch;
-use crate::solver::{Clock, Solver, Stage, System, Unknowns};
+use crate::solver::runge_kutta::Memory;
+use crate::solver::statics::LoadStep;
+use crate::solver::{Clock, Solver, Stage, Staged, System, Unknowns};
 
 /// One body, what it is made of, what acts on it, and where it stands.
 pub struct Problem<const D: usize, L, P: Precision = Double> {
@@ -36,9 +42,19 @@ pub struct Problem<const D: usize, L, P: Precision = Double> {
     ledger: Ledger,
     /// c of the solver in use, 1/s: the books need it.
     damping: f64,
+    stages: Memory<P::Field>,
+    /// What the load steps took, of static solvers.
+    pub load_steps: Vec<LoadStep>,
     /// Whether a static solver advances it: the body starts without motion, and prescribed values are the solver's to
     /// impose.
     pub is_static: bool,
+    /// How cells follow the solution; None if they do not.
+    adaptation: Option<Box<Adaptation<D>>>,
+    /// What each point belongs to: only points of one kind are merged.
+    kinds: Vec<u32>,
+    pub adapted: Adapted,
+    /// How often the points have been replaced.
+    pub generation: u64,
 }
 
 /// What came in and what was lost since the start.
@@ -47,6 +63,7 @@ struct Ledger {
     initial: f64,
     external: f64,
     damped: f64,
+    refined: f64,
     impulse: [f64; 3],
     initial_momentum: [f64; 3],
     kinetic: f64,
@@ -64,6 +81,8 @@ pub struct Balance {
     pub external: f64,
     /// Energy taken by damping.
     pub damped: f64,
+    /// Energy that came in when points were split and merged.
+    pub refined: f64,
     /// Kinetic and strain energy at the start.
     pub initial: f64,
     /// N·s
@@ -79,7 +98,7 @@ pub struct Balance {
 impl Balance {
     /// What is found less what should be there, J.
     pub fn defect(&self) -> f64 {
-        self.kinetic + self.strain + self.fracture + self.damped - self.initial - self.external
+        self.kinetic + self.strain + self.fracture + self.damped - self.initial - self.external - self.refined
     }
 
     /// What a defect is measured against: the larger of the initial energy and the external work, J.
@@ -116,7 +135,13 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             exec,
             ledger,
             damping: 0.0,
+            stages: Memory::default(),
+            load_steps: Vec::new(),
             is_static: false,
+            adaptation: None,
+            kinds: Vec::new(),
+            adapted: Adapted::default(),
+            generation: 0,
         }
     }
 
@@ -127,24 +152,10 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             self.ledger.initial = self.balance().strain;
             return;
         }
-        for p in &mut self.prescribed {
-            let c = p.component;
-            let [u, v] = [&mut self.state.displacement, &mut self.state.velocity];
-            p.start(
-                0.0,
-                components_mut::<D, _>(u)[c],
-                components_mut::<D, _>(v)[c],
-                components::<D, _>(&self.state.force)[c],
-            );
-        }
-        self.evaluate(0.0, 0.0);
-        for p in &mut self.prescribed {
-            let c = p.component;
-            let force = components::<D, _>(&self.state.force)[c];
-            for (&slot, last) in p.slots.iter().zip(&mut p.last) {
-                last[2] = force[slot as usize].to_f64();
-            }
-        }
+        self.adapt(0.0, true);
+        // What the first cells bring in is part of the initial energy.
+        (self.ledger.refined, self.adapted.energy) = (0.0, 0.0);
+        self.set_in_motion(0.0);
         let now = self.balance();
         self.ledger.initial = now.kinetic + now.strain + now.fracture;
         self.ledger.initial_momentum = now.momentum;
@@ -154,23 +165,101 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         self.ledger.momentum = now.momentum;
     }
 
-    /// One step: of velocity Verlet, then the watch over its result; or a load step of a static solver.
-    pub fn step(&mut self, solver: &Solver, clock: &mut Clock) -> Result<()> {
-        let solver = match solver {
-            Solver::VelocityVerlet(solver) => solver,
-            Solver::Statics(statics) => return self.settle(statics, clock),
-        };
-        self.damping = solver.damping;
-        solver.step(self, clock);
-        let (kinetic, momentum) = self.motion();
-        let ledger = &mut self.ledger;
-        // Damping takes ρ c v² a second, and ρ c v of momentum: trapezoidal in time, as the forces.
-        ledger.damped += solver.damping * clock.dt * (ledger.kinetic + kinetic);
-        for d in 0..3 {
-            ledger.impulse[d] -= 0.5 * solver.damping * clock.dt * (ledger.momentum[d] + momentum[d]);
+    /// Puts what is prescribed in motion at time `t` and evaluates the forces there.
+    fn set_in_motion(&mut self, t: f64) {
+        for p in self.prescribed.iter_mut().filter(|p| p.goes_on(t)) {
+            let c = p.component;
+            let [u, v] = [&mut self.state.displacement, &mut self.state.velocity];
+            p.start(
+                t,
+                components_mut::<D, _>(u)[c],
+                components_mut::<D, _>(v)[c],
+                components::<D, _>(&self.state.force)[c],
+            );
         }
-        (ledger.kinetic, ledger.momentum) = (kinetic, momentum);
-        self.watch(kinetic, clock)
+        self.loads.iter_mut().for_each(|load| load.last = None);
+        self.evaluate(t, 0.0);
+        for p in &mut self.prescribed {
+            let c = p.component;
+            let force = components::<D, _>(&self.state.force)[c];
+            for (&slot, last) in p.slots.iter().zip(&mut p.last) {
+                last[2] = force[slot as usize].to_f64();
+            }
+        }
+    }
+
+    /// Hands the body over to another solver at time `t`: displacements, broken bonds and books go on.
+    ///
+    /// Motion that begins at once, by a prescribed velocity, is work and impulse from outside; motion that a static solver
+    /// stops is booked as taken by damping, its momentum as an impulse.
+    pub fn hand_over(&mut self, solver: &Solver, t: f64) {
+        self.is_static = solver.is_static();
+        let before = self.motion();
+        if self.is_static {
+            self.state.velocity.fill(P::Field::default());
+        } else {
+            self.set_in_motion(t);
+        }
+        let after = self.motion();
+        let ledger = &mut self.ledger;
+        if self.is_static {
+            ledger.damped += before.0;
+        } else {
+            ledger.external += after.0 - before.0;
+        }
+        for d in 0..3 {
+            ledger.impulse[d] += after.1[d] - before.1[d];
+        }
+        (ledger.kinetic, ledger.momentum) = after;
+    }
+
+    /// One step of a solver in time, then the watch over its result; or a load step of a static solver, of which `observe`
+    /// is told: see [`Statics::solve`](crate::solver::Statics::solve). False when it was interrupted.
+    pub fn step(
+        &mut self,
+        solver: &Solver,
+        clock: &mut Clock,
+        observe: &mut dyn FnMut(usize, f64) -> bool,
+    ) -> Result<bool> {
+        match solver {
+            Solver::Statics(statics) => return self.settle(statics, clock, observe),
+            Solver::VelocityVerlet(verlet) => {
+                self.damping = verlet.damping;
+                verlet.step(self, clock);
+                let (kinetic, momentum) = self.motion();
+                let ledger = &mut self.ledger;
+                // Damping takes ρ c v² a second, and ρ c v of momentum: trapezoidal in time, as the forces.
+                ledger.damped += verlet.damping * clock.dt * (ledger.kinetic + kinetic);
+                for d in 0..3 {
+                    ledger.impulse[d] -= 0.5 * verlet.damping * clock.dt * (ledger.momentum[d] + momentum[d]);
+                }
+                (ledger.kinetic, ledger.momentum) = (kinetic, momentum);
+            }
+            Solver::RungeKutta(method) => {
+                self.damping = method.damping;
+                let mut memory = std::mem::take(&mut self.stages);
+                method.step(self, clock, &mut memory);
+                self.stages = memory;
+                (self.ledger.kinetic, self.ledger.momentum) = self.motion();
+            }
+        }
+        self.watch(solver, clock)?;
+        if self.adaptation.as_ref().is_some_and(|adaptation| clock.step.is_multiple_of(adaptation.every)) {
+            self.adapt(clock.time(), false);
+        }
+        Ok(true)
+    }
+
+    /// Adds the loads of time `t` to the force density. Gives the work and impulse of each over the last `dt`, by the
+    /// trapezoidal rule.
+    fn load(&mut self, t: f64, dt: f64) -> Vec<Done> {
+        let (cloud, State { displacement, force, .. }) = (&self.body.cloud, &mut self.state);
+        let apply = |load: &mut Load| {
+            let u = components::<D, _>(displacement)[load.component];
+            let force = &mut *components_mut::<D, _>(force)[load.component];
+            load.apply(t, dt, u, force, |slot| cloud.volume(slot))
+        };
+        self.loads.iter_mut().map(apply).collect()
     }
 
     /// Kinetic energy and momentum.
@@ -197,9 +286,10 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
     }
 
     /// Stops on values that are not finite, and on kinetic energy that nothing can have put in.
-    fn watch(&self, kinetic: f64, clock: &Clock) -> Result<()> {
+    fn watch(&self, solver: &Solver, clock: &Clock) -> Result<()> {
+        let kinetic = self.ledger.kinetic;
         let cause = || {
-            let stable = self.stable_step();
+            let stable = solver.stability() * self.stable_step();
             let profiles = self.loads.iter().map(|l| &l.profile).chain(self.prescribed.iter().map(|p| &p.profile));
             if let Some((formula, value)) = profiles.filter_map(|p| p.first_bad().map(|b| (p.source(), b.1))).next() {
                 return format!("the formula `{formula}` of a condition gave {value}");
@@ -297,6 +387,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             fracture: self.state.broken.energy,
             external: ledger.external,
             damped: ledger.damped,
+            refined: ledger.refined,
             initial: ledger.initial,
             momentum,
             angular_momentum: [angular[0], angular[1], angular[2]],
@@ -316,6 +407,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
     }
 
     fn field_of(&mut self, name: &str, points: Range<usize>) -> Option<Field> {
+        let damage = if name == "damage" { self.damage() } else { Vec::new() };
         let slots = &self.body.cloud.slots[points];
         let vector = |flat: &[P::Field]| {
             let parts = components::<D, _>(flat);
@@ -326,17 +418,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             "displacement" => ("displacement", "m", vector(&self.state.displacement)),
             "velocity" => ("velocity", "m/s", vector(&self.state.velocity)),
             "force" => ("force", "N/m³", vector(&self.state.force)),
-            "damage" => {
-                // φ = 1 − Σ μ β V′ / Σ β V′; Shojaei et al. 2022, eq. (21).
-                let whole = &self.family_volume;
-                let mut now = vec![0.0; self.body.cloud.n_slots()];
-                self.physics.bonded_volume(&self.body, &mut self.exec, &self.state.states, &mut now);
-                let damage = |slot: usize| {
-                    let [now, whole] = [P::Field::from_f64(now[slot]), whole[slot]].map(P::Field::to_f64);
-                    if whole > 0.0 { 1.0 - now / whole } else { 0.0 }
-                };
-                ("damage", "", scalar(&damage))
-            }
+            "damage" => ("damage", "", scalar(&|slot| damage[slot])),
             "strain_energy" => {
                 let mut density = vec![P::Field::default(); self.body.cloud.n_slots()];
                 self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
@@ -345,6 +427,17 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             _ => return None,
         };
         Some(Field { name, unit, values })
+    }
+
+    /// φ = 1 − Σ μ β V′ / Σ β V′ by slot; Shojaei et al. 2022, eq. (21).
+    fn damage(&mut self) -> Vec<f64> {
+        let mut now = vec![0.0; self.body.cloud.n_slots()];
+        self.physics.bonded_volume(&self.body, &mut self.exec, &self.state.states, &mut now);
+        let damage = |(now, whole): (&f64, &P::Field)| {
+            let [now, whole] = [P::Field::from_f64(*now), *whole].map(P::Field::to_f64);
+            if whole > 0.0 { 1.0 - now / whole } else { 0.0 }
+        };
+        now.par_iter().zip(&self.family_volume).map(damage).collect()
     }
 
     /// BLAKE3 of displacements, velocities and bond states: equal exactly when two runs have the same bits.
@@ -382,6 +475,11 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         };
         let bonds = size_of_val(self.state.states.words()) + self.physics.operator.memory();
         fields + classes + points + families + bonds
+    }
+
+    /// Whether cells follow the solution.
+    pub fn is_adapting(&self) -> bool {
+        self.adaptation.as_ref().is_some_and(|adaptation| adaptation.criteria.is_some())
     }
 
     /// Broken pairs, pre-cracks not counted.
@@ -462,18 +560,73 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> System for Problem<D, L, P> {
 
     fn evaluate(&mut self, t: f64, dt: f64) {
         self.physics.evaluate(&self.body, &mut self.exec, &mut self.state, dt);
-        let cloud = &self.body.cloud;
-        for load in &mut self.loads {
-            let c = load.component;
-            let u = components::<D, _>(&self.state.displacement)[c];
-            let force = &mut *components_mut::<D, _>(&mut self.state.force)[c];
-            let done = load.apply(t, dt, u, force, |slot| cloud.volume(slot));
+        let done = self.load(t, dt);
+        for (load, done) in self.loads.iter().zip(done) {
             self.ledger.external += done.work;
-            self.ledger.impulse[c] += done.impulse;
+            self.ledger.impulse[load.component] += done.impulse;
         }
     }
 
     fn stable_step(&self) -> f64 {
         self.physics.stable_step(&self.body)
+    }
+}
+
+impl<const D: usize, L: BondLaw<D>, P: Packs> Staged for Problem<D, L, P> {
+    fn stage(&mut self, t: f64, end: f64, dt: f64) {
+        let Problem { body, physics, state, prescribed, exec, .. } = self;
+        let State { displacement, velocity, force, states, .. } = state;
+        for p in prescribed {
+            let u = &mut *components_mut::<D, _>(displacement)[p.component];
+            let v = &mut *components_mut::<D, _>(velocity)[p.component];
+            p.stage(t, end, dt, u, v);
+        }
+        let (input, output) = (components::<D, _>(displacement), components_mut::<D, _>(force));
+        physics.force_density::<D, P>(body, exec, states, input, output);
+        self.load(t, 0.0);
+    }
+
+    fn book(&mut self, share: f64, end: f64, dt: f64) {
+        let weight = share * dt;
+        if self.damping > 0.0 {
+            let (kinetic, momentum) = self.motion();
+            self.ledger.damped += 2.0 * self.damping * weight * kinetic;
+            for d in 0..3 {
+                self.ledger.impulse[d] -= self.damping * weight * momentum[d];
+            }
+        }
+        let (cloud, inertia) = (&self.body.cloud, self.physics.density);
+        let velocity = components::<D, _>(&self.state.velocity);
+        let force = components::<D, _>(&self.state.force);
+        let loads = self.loads.iter().map(|load| {
+            let c = load.component;
+            (c, load.book(weight, velocity[c], |slot| cloud.volume(slot)))
+        });
+        let step = Step { t: end, dt, inertia, damping: self.damping };
+        let prescribed = self.prescribed.iter_mut().map(|p| {
+            let c = p.component;
+            (c, p.book(weight, &step, velocity[c], force[c], |slot| cloud.volume(slot)))
+        });
+        for (c, done) in loads.chain(prescribed) {
+            self.ledger.external += done.work;
+            self.ledger.impulse[c] += done.impulse;
+        }
+    }
+
+    fn arrive(&mut self, t: f64, dt: f64) {
+        let step = Step { t, dt, inertia: self.physics.density, damping: self.damping };
+        let State { displacement, velocity, .. } = &mut self.state;
+        for p in &mut self.prescribed {
+            let c = p.component;
+            let u = &mut *components_mut::<D, _>(displacement)[c];
+            let v = &mut *components_mut::<D, _>(velocity)[c];
+            let cloud = &self.body.cloud;
+            let done = p.arrive(&step, u, v, |slot| cloud.volume(slot));
+            self.ledger.external += done.work;
+            self.ledger.impulse[c] += done.impulse;
+        }
+        // A bond that breaks has acted all through the step, and takes what it holds at its end.
+        self.physics.evaluate(&self.body, &mut self.exec, &mut self.state, 0.0);
+        self.load(t, 0.0);
     }
 }

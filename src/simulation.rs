@@ -1,5 +1,6 @@
 //! The event loop: step, look, write, until the end. The first file to read.
 
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -13,27 +14,60 @@ use crate::family::BondLaw;
 use crate::field::{Double, Field, Precision, embed};
 use crate::geometry::Arrangement;
 use crate::output::history::History;
-use crate::output::report::{Energy, Report, Tip, WallSeconds, peak_memory};
+use crate::output::report::{Energy, Refinement, Report, Tip, WallSeconds, peak_memory};
 use crate::output::snapshot::Look;
 use crate::output::source::{Facts, Points, Source};
 use crate::output::writer::{Order, Output};
 use crate::output::writer_thread::{Batch, WriterThread};
-use crate::problem::{Balance, Problem};
+use crate::problem::{Adapted, Balance, Problem};
+use crate::solver::statics::LoadStep;
 use crate::solver::{Clock, Solver};
 
 /// A model that can be stepped and looked at: a [`Problem`] whose dimension and law are no longer types.
 pub trait Stepper: Source + Send {
     fn start(&mut self);
-    fn step(&mut self, solver: &Solver, clock: &mut Clock) -> Result<()>;
+    /// Takes a step. Within a load step of a static solver, `observe` is told iterations and relative imbalance, and
+    /// interrupts it by answering false; the state is then the last one at rest, and this gives false.
+    fn step_observed(
+        &mut self,
+        solver: &Solver,
+        clock: &mut Clock,
+        observe: &mut dyn FnMut(usize, f64) -> bool,
+    ) -> Result<bool>;
+    /// Hands the body over to another solver at time `t`, s.
+    fn hand_over(&mut self, solver: &Solver, t: f64);
+    /// What the load steps of static solvers took.
+    fn load_steps(&self) -> &[LoadStep];
+    /// Takes a step that nobody observes.
+    fn step(&mut self, solver: &Solver, clock: &mut Clock) -> Result<()> {
+        self.step_observed(solver, clock, &mut |_, _| true).map(|_| ())
+    }
+}
+
+/// A solver of a chain, and its part of the run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    pub solver: Solver,
+    /// s
+    pub dt: f64,
+    pub n_steps: u64,
+    /// Steps before it.
+    pub first: u64,
+    /// Time at its end, s.
+    pub ends: f64,
 }
 
 /// A case that is ready to run.
 pub struct Simulation {
     pub title: String,
     pub model: Box<dyn Stepper>,
+    /// The one at work.
     pub solver: Solver,
     pub clock: Clock,
+    /// Of all solvers.
     pub n_steps: u64,
+    /// The solvers that follow.
+    pub later: VecDeque<Leg>,
     pub history: History,
     /// Until the run starts, which hands their writers to the writer thread.
     pub outputs: Vec<Output>,
@@ -53,13 +87,16 @@ pub struct Progress {
     pub imbalance: f64,
     pub broken_bonds: u64,
     pub seconds: f64,
+    /// Iterations within a load step, and how far forces are out of balance there.
+    pub within: Option<(usize, f64)>,
 }
 
-/// What an observer of a run asks for after each step.
+/// What an observer of a run asks for after each step, and each iteration of a static solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wish {
     Continue,
-    /// Finish this step, write the last frame, history and report, and stop.
+    /// Finish this step, or leave this load step at the last state at rest, write the last frame, history and report, and
+    /// stop.
     Stop,
 }
 
@@ -74,9 +111,21 @@ impl Simulation {
         let mut stop = None;
         let mut interrupted = false;
         while self.clock.step < self.n_steps {
-            if let Err(error) = self.model.step(&self.solver, &mut self.clock) {
-                stop = Some(error);
-                break;
+            let before = self.progress(begin);
+            let stepped = self.step(&mut |iterations, imbalance| {
+                let (seconds, within) = (begin.elapsed().as_secs_f64(), Some((iterations, imbalance)));
+                observe(&Progress { seconds, within, ..before }) == Wish::Continue
+            });
+            match stepped {
+                Ok(true) => {}
+                Ok(false) => {
+                    interrupted = true;
+                    break;
+                }
+                Err(error) => {
+                    stop = Some(error);
+                    break;
+                }
             }
             self.write(&mut desk, false)?;
             if observe(&self.progress(begin)) == Wish::Stop {
@@ -100,6 +149,17 @@ impl Simulation {
         }
     }
 
+    /// Takes the next step, by the next solver where it is its turn. `observe`: see [`Stepper::step_observed`].
+    pub fn step(&mut self, observe: &mut dyn FnMut(usize, f64) -> bool) -> Result<bool> {
+        if let Some(leg) = self.later.front().copied().filter(|leg| leg.first == self.clock.step) {
+            self.later.pop_front();
+            self.clock.turn(leg.dt);
+            self.solver = leg.solver;
+            self.model.hand_over(&self.solver, self.clock.time());
+        }
+        self.model.step_observed(&self.solver, &mut self.clock, observe)
+    }
+
     /// Starts the writer thread.
     fn desk(&mut self) -> Result<Desk> {
         let begin = Instant::now();
@@ -107,13 +167,18 @@ impl Simulation {
         let (orders, writers): (Vec<_>, Vec<_>) = outputs.unzip();
         let history = self.history.table(&*self.model);
         let thread = WriterThread::start(history, writers, self.threads, &self.folder)?;
-        Ok(Desk { orders, thread, seconds: begin.elapsed().as_secs_f64() })
+        Ok(Desk { orders, points: None, thread, seconds: begin.elapsed().as_secs_f64() })
     }
 
     /// Takes what is due of this instant and hands it to the writer thread.
     fn write(&mut self, desk: &mut Desk, last: bool) -> Result<()> {
         let begin = Instant::now();
         let clock = self.clock;
+        let places = desk.orders.iter().any(|order| order.wants.at.is_some());
+        if places && desk.points.as_ref().is_none_or(|known| !Arc::ptr_eq(known, self.model.points())) {
+            desk.points = Some(self.model.points().clone());
+            desk.orders.iter_mut().for_each(|order| order.wants.find(self.model.positions()));
+        }
         let mut look = Look::new(&mut *self.model, clock);
         let row = self.history.row(&mut look, &clock, last);
         let due = desk
@@ -140,6 +205,7 @@ impl Simulation {
             imbalance: self.history.imbalance(),
             broken_bonds: self.model.broken_pairs(),
             seconds: begin.elapsed().as_secs_f64(),
+            within: None,
         }
     }
 
@@ -160,9 +226,10 @@ impl Simulation {
             spacing: facts.spacing,
             micromodulus: facts.micromodulus,
             critical_stretch: facts.critical_stretch,
+            surface: facts.surface,
             steps: self.clock.step,
             time_step: self.clock.dt,
-            stable_time_step: facts.stable_step,
+            stable_time_step: facts.stable_step * self.solver.stability(),
             end_time: self.clock.time(),
             threads: self.threads,
             wall_seconds: wall,
@@ -174,8 +241,18 @@ impl Simulation {
                 fracture: b.fracture,
                 external: b.external,
                 damped: b.damped,
+                refined: b.refined,
                 initial: b.initial,
             },
+            refinement: self.model.adapted().map(|adapted| Refinement {
+                events: adapted.events,
+                most_points: adapted.points[0],
+                mean_points: adapted.points[1] as f64 / (adapted.looks as f64 + 1.0),
+                energy: b.refined,
+                energy_turnover: adapted.energy,
+                families_found_anew: adapted.bonds[0] as f64 / (adapted.bonds[1] as f64).max(1.0),
+                points_seen_by_coarser: adapted.seen,
+            }),
             energy_imbalance: self.history.imbalance(),
             momentum_error: self.history.momentum_error(),
             broken_bonds: self.model.broken_pairs(),
@@ -185,6 +262,7 @@ impl Simulation {
                 largest_speed: tip.largest_speed,
                 rayleigh_speed: facts.rayleigh_speed,
             }),
+            load_steps: self.model.load_steps().to_vec(),
             state_hash: self.model.hash(),
         }
     }
@@ -193,6 +271,8 @@ impl Simulation {
 /// Where the stepping thread and the writer thread meet.
 struct Desk {
     orders: Vec<Order>,
+    /// Among which the places that orders want have been found.
+    points: Option<Arc<Points>>,
     thread: WriterThread,
     /// That the stepping thread has spent here.
     seconds: f64,
@@ -240,25 +320,29 @@ pub fn prepare_folder(folder: &Path, overwrite: bool) -> Result<()> {
 pub struct Model<const D: usize, L, P: Precision = Double> {
     pub problem: Problem<D, L, P>,
     facts: Facts,
-    /// Made when a writer first asks.
+    /// Made when a writer first asks, and again when points have been replaced.
     points: OnceLock<Arc<Points>>,
+    generation: u64,
 }
 
 impl<const D: usize, L: BondLaw<D>, P: Packs> Model<D, L, P> {
     /// `facts` as far as the case knows them; counts and sizes are filled in from the problem.
     pub fn new(problem: Problem<D, L, P>, facts: Facts) -> Self {
         let cloud = &problem.body.cloud;
-        let facts = Facts {
-            dimension: D,
-            points: cloud.n_points(),
-            bonds: problem.n_bonds,
-            cut_bonds: problem.n_cut,
-            horizon: problem.body.horizon,
-            spacing: cloud.spacing,
-            memory: problem.memory() as u64,
-            ..facts
-        };
-        Model { problem, facts, points: OnceLock::new() }
+        let facts = Facts { dimension: D, horizon: problem.body.horizon, spacing: cloud.spacing, ..facts };
+        let mut model = Model { problem, facts, points: OnceLock::new(), generation: 0 };
+        model.count();
+        model
+    }
+
+    /// Takes note of the points as they are now.
+    fn count(&mut self) {
+        let problem = &self.problem;
+        self.facts.points = problem.body.cloud.n_points();
+        (self.facts.bonds, self.facts.cut_bonds) = (problem.n_bonds, problem.n_cut);
+        self.facts.memory = problem.memory() as u64;
+        self.generation = problem.generation;
+        self.points = OnceLock::new();
     }
 }
 
@@ -294,6 +378,9 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Source for Model<D, L, P> {
     fn reactions(&self) -> Vec<(String, f64)> {
         self.problem.prescribed.iter().map(|p: &Prescribed| (p.name.clone(), p.reaction)).collect()
     }
+    fn adapted(&self) -> Option<Adapted> {
+        self.problem.is_adapting().then_some(self.problem.adapted)
+    }
     fn hash(&self) -> String {
         self.problem.hash()
     }
@@ -312,9 +399,27 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Source for Model<D, L, P> {
 impl<const D: usize, L: BondLaw<D>, P: Packs> Stepper for Model<D, L, P> {
     fn start(&mut self) {
         self.problem.start();
+        if self.generation != self.problem.generation {
+            self.count();
+        }
     }
-    fn step(&mut self, solver: &Solver, clock: &mut Clock) -> Result<()> {
-        self.problem.step(solver, clock)
+    fn step_observed(
+        &mut self,
+        solver: &Solver,
+        clock: &mut Clock,
+        observe: &mut dyn FnMut(usize, f64) -> bool,
+    ) -> Result<bool> {
+        let done = self.problem.step(solver, clock, observe);
+        if self.generation != self.problem.generation {
+            self.count();
+        }
+        done
+    }
+    fn hand_over(&mut self, solver: &Solver, t: f64) {
+        self.problem.hand_over(solver, t);
+    }
+    fn load_steps(&self) -> &[LoadStep] {
+        &self.problem.load_steps
     }
 }
 
@@ -326,6 +431,7 @@ mod tests {
     use crate::output::schedule::Schedule;
     use crate::output::snapshot::{Snapshot, Wants};
     use crate::output::writer::Writer;
+    use crate::physics::elasticity::surface::SurfaceEffect;
     use crate::solver::VelocityVerlet;
     use std::sync::Mutex;
 
@@ -376,11 +482,20 @@ mod tests {
 
     impl Stepper for Still {
         fn start(&mut self) {}
-        fn step(&mut self, _: &Solver, clock: &mut Clock) -> Result<()> {
+        fn hand_over(&mut self, _: &Solver, _: f64) {}
+        fn load_steps(&self) -> &[LoadStep] {
+            &[]
+        }
+        fn step_observed(
+            &mut self,
+            _: &Solver,
+            clock: &mut Clock,
+            _: &mut dyn FnMut(usize, f64) -> bool,
+        ) -> Result<bool> {
             clock.step += 1;
             let (step, time) = (clock.step, clock.time());
             let stop = NumericalStop { step, time, field: "velocity", value: f64::NAN, point: None, cause: "".into() };
-            if step == self.stops_at { Err(Error::Numbers(Box::new(stop))) } else { Ok(()) }
+            if step == self.stops_at { Err(Error::Numbers(Box::new(stop))) } else { Ok(true) }
         }
     }
 
@@ -393,7 +508,7 @@ mod tests {
 
     impl Writer for Slow {
         fn wants(&self) -> Wants {
-            Wants { fields: vec!["damage"], point: None }
+            Wants::everywhere(vec!["damage"])
         }
         fn write(&mut self, snapshot: &Snapshot) -> Result<()> {
             std::thread::sleep(std::time::Duration::from_millis(3));
@@ -428,6 +543,7 @@ mod tests {
             rayleigh_speed: None,
             micromodulus: 1.0,
             critical_stretch: None,
+            surface: SurfaceEffect::default(),
             memory: 0,
         };
         let points = Arc::new(Points { positions: vec![[0.0; 3]], sizes: Vec::new(), facts });
@@ -440,8 +556,9 @@ mod tests {
             title: String::new(),
             model: Box::new(Still { points, stops_at, computed: 0 }),
             solver: Solver::VelocityVerlet(VelocityVerlet { damping: 0.0 }),
-            clock: Clock { step: 0, dt: 1.0 },
+            clock: Clock::new(1.0),
             n_steps: 20,
+            later: VecDeque::new(),
             history: History::new(folder.join("history.csv"), 5, None),
             outputs: vec![output(2, &seen[0]), output(3, &seen[1])],
             folder,

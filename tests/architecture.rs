@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const LEVELS: [&[&str]; 11] = [
     &["field", "lane", "expression"],
     &["geometry"],
-    &["family"],
+    &["family", "refinement"],
     &["discretization"],
     &["execution", "conditions"],
     &["physics", "solver"],

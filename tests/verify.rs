@@ -77,6 +77,16 @@ fn a_plate_with_a_hole_is_strained_as_kirsch_says() {
 }
 
 #[test]
+fn waves_at_rest_converge_in_all_three_ways() {
+    passes("convergence");
+}
+
+#[test]
+fn corrected_bars_are_as_long_as_they_should_be() {
+    passes("surface-effect");
+}
+
+#[test]
 fn the_seven_nodes_have_the_printed_matrix() {
     passes("bar-7-nodes");
 }

@@ -22,13 +22,24 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
             Some(s) => say!("critical stretch  {s:.6e}"),
             None => say!("critical stretch  none: bonds never break"),
         }
+        let surface = &facts.surface;
+        say!(
+            "surface effect    {:.1} % of the points off by more than 1 %; softest {:.3}; body {:.2} % too soft",
+            100.0 * surface.points_affected,
+            surface.softest,
+            100.0 * surface.mean_deficit
+        );
         say!("bar wave speed    {:.1} m/s", facts.bar_speed);
         if let Some(speed) = facts.rayleigh_speed {
             say!("Rayleigh speed    {speed:.1} m/s");
         }
-        say!("stable step       {:.6e} s", facts.stable_step);
-        let end = simulation.n_steps as f64 * simulation.clock.dt;
-        say!("steps             {} of {:.6e} s, to t = {end:.6e} s", simulation.n_steps, simulation.clock.dt);
+        say!("stable step       {:.6e} s", facts.stable_step * simulation.solver.stability());
+        let steps = simulation.later.front().map_or(simulation.n_steps, |leg| leg.first);
+        let end = steps as f64 * simulation.clock.dt;
+        say!("steps             {steps} of {:.6e} s, to t = {end:.6e} s", simulation.clock.dt);
+        for leg in &simulation.later {
+            say!("then              {} of {:.6e} s, to t = {:.6e} s", leg.n_steps, leg.dt, leg.ends);
+        }
         let mib = |bytes: u64| bytes as f64 / 1048576.0;
         say!("memory            {:.1} MiB for fields and bonds", mib(facts.memory));
         if let Some(free) = available_memory() {

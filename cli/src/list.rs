@@ -11,7 +11,7 @@ use crate::bench::PROBLEMS;
 use crate::say;
 
 /// What can be listed.
-pub const TOPICS: [&str; 16] = [
+pub const TOPICS: [&str; 17] = [
     "cases",
     "shapes",
     "regions",
@@ -20,6 +20,7 @@ pub const TOPICS: [&str; 16] = [
     "failures",
     "influence",
     "volumes",
+    "corrections",
     "schemes",
     "conditions",
     "solvers",
@@ -31,7 +32,7 @@ pub const TOPICS: [&str; 16] = [
 ];
 
 /// Topic, and the name of its type in the schema.
-const TYPES: [(&str, &str); 12] = [
+const TYPES: [(&str, &str); 13] = [
     ("shapes", "Shape"),
     ("regions", "Region"),
     ("cracks", "Crack"),
@@ -39,6 +40,7 @@ const TYPES: [(&str, &str); 12] = [
     ("failures", "Failure"),
     ("influence", "InfluenceFunction"),
     ("volumes", "PartialVolumes"),
+    ("corrections", "SurfaceCorrection"),
     ("schemes", "Scheme"),
     ("conditions", "Condition"),
     ("solvers", "Solver"),

@@ -61,6 +61,12 @@ impl Line {
 fn text(p: &Progress) -> String {
     let rate = p.step as f64 / p.seconds.max(1e-9);
     let left = (p.n_steps - p.step) as f64 / rate.max(1e-9);
+    if let Some((iterations, imbalance)) = p.within {
+        return format!(
+            "step {}/{}  t {:.4e} s  iteration {iterations} of the next, forces out of balance by {imbalance:.1e}  broken {}",
+            p.step, p.n_steps, p.time, p.broken_bonds
+        );
+    }
     format!(
         "step {}/{}  t {:.4e} s  {:.0} steps/s  {} left  imbalance {:.1e}  broken {}",
         p.step,

@@ -9,6 +9,7 @@ use bondwise::Result;
 use bondwise::case::build::{Options, load};
 use bondwise::output::report::Report;
 use bondwise::simulation::{Wish, prepare_folder};
+use bondwise::solver::statics::LoadStep;
 
 use crate::progress::Line;
 use crate::{RunArgs, on_threads, say};
@@ -35,6 +36,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
                 simulation.threads,
                 folder.display()
             );
+            let surface = &facts.surface;
+            say!(
+                "surface effect: {:.1} % of the points are off, the softest has {:.2} of its stiffness",
+                100.0 * surface.points_affected,
+                surface.softest
+            );
         }
         let stop = Arc::new(AtomicBool::new(false));
         let asked = stop.clone();
@@ -43,7 +50,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
             if asked.swap(true, Ordering::SeqCst) {
                 std::process::exit(130);
             }
-            eprintln!("\ninterrupted: finishing this step and writing the last frame (again to end at once)");
+            eprintln!(
+                "\ninterrupted: finishing this step, or leaving this load step, and writing the last frame (again to end at once)"
+            );
         });
         let mut line = Line::new(args.quiet);
         let report = simulation.run(|progress| {
@@ -101,6 +110,18 @@ fn summary(report: &Report, folder: &Path) {
             "crack tip: ({place}) mm; largest speed {:.0} m/s (Rayleigh speed {:.0} m/s)",
             tip.largest_speed,
             tip.rayleigh_speed.unwrap_or(f64::NAN)
+        );
+    }
+    if !report.load_steps.is_empty() {
+        let steps = &report.load_steps;
+        let sum = |of: fn(&LoadStep) -> usize| steps.iter().map(of).sum::<usize>();
+        say!(
+            "load steps: {}; {} iterations, {} of the linear solver, {} halvings; largest imbalance of forces {:.2e}",
+            steps.len(),
+            sum(|s| s.iterations),
+            sum(|s| s.linear_iterations),
+            sum(|s| s.halvings),
+            steps.iter().map(|s| s.imbalance).fold(0.0, f64::max)
         );
     }
     let w = &report.wall_seconds;

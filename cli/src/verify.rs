@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use bondwise::expression::nearest;
-use bondwise::output::picture::write_png;
+use bondwise::output::picture::{write_animation, write_png};
 use bondwise::verify::bar::Micromodulus;
 use bondwise::verify::{self, Measure, Outcome, Row, STUDIES, Study};
 use bondwise::{Error, Result};
@@ -113,12 +113,17 @@ fn conclusion(n: usize, failed: &[&str]) -> String {
 
 fn write_plots(study: &Study, outcome: &Outcome, folder: &Path) -> Result<Vec<PathBuf>> {
     let mut written = Vec::new();
-    if !outcome.plots.is_empty() {
+    if !outcome.plots.is_empty() || !outcome.animations.is_empty() {
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
     }
     for (name, image) in &outcome.plots {
         let path = folder.join(format!("{}_{name}.png", study.name));
         write_png(image, &path).map_err(|e| Error::io(&path, e))?;
+        written.push(path);
+    }
+    for (name, images) in &outcome.animations {
+        let path = folder.join(format!("{}_{name}.png", study.name));
+        write_animation(images, &path).map_err(|e| Error::io(&path, e))?;
         written.push(path);
     }
     Ok(written)

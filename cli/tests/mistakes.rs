@@ -81,6 +81,7 @@ const SHAPE: &str = "shape = { rectangle = { size = [\"20 mm\", \"10 mm\"] } }\n
 const POINTS: &str = "points = { csv = { file = \"points.csv\" } }";
 const CRACKS: &str = "cracks = [{ segment = { from = [\"-1 cm\", 0.0], to = [\"-5 mm\", 0.0] } }]";
 const YOUNG: &str = "young = \"72 GPa\"";
+const SOLVER: &str = "[solver.velocity_verlet]\nend_time = \"5 us\"\nsafety = 0.8\n";
 const SAFETY: &str = "safety = 0.8";
 const VALUE: &str = "value = \"1 MPa\"";
 const PROBE: &str = "probe = { name = \"tip\", at = [\"-5 mm\", 0.0], every_steps = 5 }";
@@ -105,13 +106,67 @@ fn mistakes() -> Vec<Mistake> {
         patch("unknown_table", "[solver.", "[solvr."),
         patch("unknown_key_far", "[discretization]", "[discretization]\nmeshless = true"),
         patch("unknown_output", "vtu = {", "vtk = {"),
+        patch("unknown_correction", "[discretization]", "[discretization]\nsurface_correction = \"energie\""),
+        patch(
+            "correction_of_moving_cells",
+            "[discretization]",
+            "[refinement]\nlevels = 1\nrefine_where = \"damage > 0\"\n\n[discretization]\nsurface_correction = \"energy\"",
+        ),
+        patch(
+            "correction_by_volume_of_zones",
+            "[discretization]",
+            "[refinement]\nlevels = 1\nzones = [{ region = { where = \"x > 0\" }, level = 1 }]\n\n[discretization]\n\
+             surface_correction = \"volume\"",
+        ),
         patch("unknown_law", "bond_based = {", "bond_base = {"),
         patch("unknown_influence", "\"constant\"", "\"gausian\""),
         patch("influence_without_data", "\"constant\"", "\"gaussian\""),
         patch("missing_key", "end_time = \"5 us\"\n", ""),
-        patch("missing_table", "[solver.velocity_verlet]\nend_time = \"5 us\"\nsafety = 0.8\n", ""),
+        patch("missing_table", SOLVER, ""),
+        patch("unknown_solver", "solver.velocity_verlet", "solver.velocty_verlet"),
+        patch(
+            "unknown_solver_in_chain",
+            SOLVER,
+            "[[solver]]\nnewton = {}\n[[solver]]\nrunge_cutta = { end_time = 2.0 }\n",
+        ),
+        patch(
+            "chain_that_goes_back",
+            SOLVER,
+            "[[solver]]\nnewton = { end_time = \"5 us\" }\n[[solver]]\nvelocity_verlet = { end_time = \"5 us\" }\n",
+        ),
+        patch(
+            "direct_with_preconditioner",
+            SOLVER,
+            "[solver.newton]\nlinear = \"direct\"\npreconditioner = \"jacobi\"\n",
+        ),
         patch("missing_table_without_variants", "[discretization]\nhorizon = \"3*h\"\ninfluence = \"constant\"\n", ""),
         patch("duplicate_key", SAFETY, "safety = 0.8\nsafety = 0.7"),
+        patch("refinement_of_nothing", "[solver.", "[refinement]\nlevels = 2\n\n[solver."),
+        patch(
+            "refinement_unknown_name",
+            "[solver.",
+            "[refinement]\nlevels = 2\nrefine_where = \"strech > 0.5\"\n\n[solver.",
+        ),
+        patch(
+            "refinement_beyond_the_finest",
+            "[solver.",
+            "[refinement]\nlevels = 1\nzones = [{ region = { where = \"x > 0\" }, level = 3 }]\n\n[solver.",
+        ),
+        patch(
+            "refinement_at_rest",
+            SOLVER,
+            "[refinement]\nlevels = 1\nrefine_where = \"damage > 0\"\n\n[solver.quasi_static]\n",
+        ),
+        Mistake::patch(
+            "refinement_of_scattered_points",
+            &[
+                ("spacing = \"h\"\n", "spacing = \"h\"\nperturb = { amplitude = 0.1 }\n"),
+                (
+                    "[solver.",
+                    "[refinement]\nlevels = 1\nkeep_where = \"1\"\nzones = [{ region = { where = \"x > 0\" }, level = 1 }]\n\n[solver.",
+                ),
+            ],
+        ),
         patch("duplicate_table", "[solver.", "[discretization]\nhorizon = \"4*h\"\n\n[solver."),
         patch("dotted_key_clashes", "[sets]", "[case.title]\nshort = \"strip\"\n\n[sets]"),
         patch("list_is_table", "[[conditions]]\non = \"top\"", "[conditions]\non = \"top\""),

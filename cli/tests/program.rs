@@ -351,6 +351,36 @@ fn an_interrupted_run_ends_well() {
     assert!(place.0.join(format!("results/frames/frame_{steps:08}.vtu")).is_file());
 }
 
+/// A tolerance that rounding puts out of reach: the load step would go on for hours.
+#[cfg(unix)]
+#[test]
+fn a_load_step_is_interrupted_on_its_way() {
+    use std::io::{BufRead, BufReader};
+
+    let place = Place::new("load_step");
+    let solver = "[solver.dynamic_relaxation]\ntolerance = 1e-30\nmax_iterations = 1000000000\n";
+    let text = STRIP.replace("[solver.velocity_verlet]\nend_time = \"10 us\"\n", solver);
+    assert!(text.contains(solver));
+    fs::write(place.0.join("rest.toml"), text).unwrap();
+    let args = ["run", "rest.toml", "--out", "results"];
+    let mut child = place.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut out = BufReader::new(child.stdout.take().unwrap());
+    let mut line = String::new();
+    // The heading is two lines; what answers Ctrl-C is there right after it.
+    out.read_line(&mut line).unwrap();
+    out.read_line(&mut line).unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    std::io::Read::read_to_string(&mut out, &mut line).unwrap();
+    let (code, _, error) = answer(&child.wait_with_output().unwrap());
+    assert_eq!(code, 130, "{error}");
+    assert!(line.contains("interrupted after 0 steps") && line.contains("load steps: 1;"), "{line}");
+    let report = place.report("results");
+    assert_eq!((report["status"].as_str(), report["steps"].as_u64()), (Some("interrupted"), Some(0)));
+    assert!(report["load_steps"][0]["iterations"].as_u64().unwrap() > 0);
+}
+
 #[test]
 fn a_reader_that_goes_away_does_not_end_a_run() {
     let place = Place::new("pipe");

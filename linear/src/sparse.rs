@@ -44,6 +44,19 @@ impl Sparse {
         matrix
     }
 
+    /// The matrix whose row `i` holds the entries `starts[i]..starts[i + 1]`, columns ascending.
+    pub fn from_rows(starts: Vec<u64>, columns: Vec<u32>, values: Vec<f64>) -> Self {
+        let size = starts.len().saturating_sub(1);
+        let whole = starts.first() == Some(&0) && starts.last() == Some(&(columns.len() as u64));
+        assert!(whole && columns.len() == values.len(), "{size} rows of {} columns", columns.len());
+        for row in starts.windows(2) {
+            let columns = &columns[row[0] as usize..row[1] as usize];
+            let last = columns.last().is_none_or(|last| (*last as usize) < size);
+            assert!(last && columns.windows(2).all(|pair| pair[0] < pair[1]), "columns ascend within {size}");
+        }
+        Sparse { starts, columns, values }
+    }
+
     /// Number of rows and of columns.
     pub fn size(&self) -> usize {
         self.starts.len() - 1

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use super::diagnostics::Diagnostic;
 use super::model::{
-    BondBased, Case, Crack, CriticalStretch, FailurePair, Law, Load, Motion, Output, Plane, Region, Shape, Solver,
+    BondBased, Case, Crack, CriticalStretch, FailurePair, Law, LinearSolver, Load, Motion, Output, Plane, Region,
+    Shape, Solver, SurfaceCorrection,
 };
 use super::read::{Located, Source};
 use crate::expression::nearest;
@@ -57,6 +58,8 @@ impl Checker<'_> {
             self.region(region, dimension, &path);
         }
         self.discretization(case);
+        self.refinement(case);
+        self.correction(case);
         let elasticity = &case.physics.elasticity;
         let (law, parameters) = match &elasticity.law {
             Law::BondBased(p) => ("bond_based", p),
@@ -111,29 +114,81 @@ impl Checker<'_> {
                 _ => {}
             }
         }
-        let unbroken = match &case.solver {
-            Solver::Static(_) => Some("static"),
-            Solver::Newton(_) => Some("newton"),
-            Solver::DynamicRelaxation(_) => Some("dynamic_relaxation"),
-            Solver::VelocityVerlet(_) | Solver::QuasiStatic(_) => None,
-        };
-        if let Some(name) = unbroken.filter(|_| case.physics.elasticity.failure.is_some()) {
-            let message = format!("no bond breaks in `solver.{name}`; they do in `quasi_static` and `velocity_verlet`");
-            self.warning(&format!("solver.{name}"), message);
-        }
-        if let Solver::VelocityVerlet(solver) = &case.solver
-            && solver.safety.is_some()
-            && solver.time_step.is_some()
-        {
-            let path = "solver.velocity_verlet.time_step";
-            self.error(path, "`safety` and `time_step` are both given; only one may be", "remove one of them");
-        }
+        self.solvers(case);
         self.outputs(case);
         // Next to a mistake, such as a misspelt name, it would be an echo.
         for name in case.sets.keys().filter(|_| self.list.is_empty()).cloned().collect::<Vec<_>>() {
             if !used.contains(name.as_str()) {
                 self.warning(&format!("sets.{name}"), "this set is defined but never used");
             }
+        }
+    }
+
+    fn refinement(&mut self, case: &Case) {
+        let Some(refinement) = &case.refinement else { return };
+        if case.geometry.points.is_some() || case.geometry.perturb.is_some() {
+            let (key, help) = match case.geometry.points {
+                Some(_) => ("points", "give the body as `geometry.shape`, or the points as fine as they are wanted"),
+                None => ("perturb", "remove one of them"),
+            };
+            let message = "refinement splits the cells of a lattice, and these points are none";
+            self.error(&format!("geometry.{key}"), message, help);
+        }
+        for (k, zone) in refinement.zones.iter().enumerate() {
+            self.region(&zone.region, case.case.dimension, &format!("refinement.zones[{k}].region"));
+            if zone.level > refinement.levels {
+                let message = format!("the zone wants level {}, beyond the finest, {}", zone.level, refinement.levels);
+                self.error(&format!("refinement.zones[{k}].level"), message, "raise `refinement.levels`");
+            }
+        }
+        if refinement.zones.is_empty() && refinement.refine_where.is_none() {
+            let message = "this refines nothing: neither `zones` nor `refine_where` is given";
+            self.error("refinement", message, "add one, such as `refine_where = \"stretch > 0.5 or damage > 0\"`");
+        }
+        if refinement.keep_where.is_some() && refinement.refine_where.is_none() {
+            let message = "without `refine_where` cells are never merged";
+            self.error("refinement.keep_where", message, "remove it, or add `refine_where`");
+        }
+        let moves = |solver: &Solver| matches!(solver, Solver::VelocityVerlet(_) | Solver::RungeKutta(_));
+        if refinement.refine_where.is_some() && !case.solver.stages().any(|(_, solver)| moves(solver)) {
+            let message = "cells follow the solution in motion only; this solver brings the body to rest";
+            self.error("refinement.refine_where", message, "use `zones`, or `solver.velocity_verlet`");
+        }
+    }
+
+    fn solvers(&mut self, case: &Case) {
+        let mut begins = 0.0;
+        let breaks = |solver: &Solver| {
+            matches!(solver, Solver::VelocityVerlet(_) | Solver::RungeKutta(_) | Solver::QuasiStatic(_))
+        };
+        let any = case.solver.stages().any(|(_, solver)| breaks(solver));
+        for (path, solver) in case.solver.stages() {
+            match solver {
+                Solver::VelocityVerlet(s) | Solver::RungeKutta(s) if s.safety.is_some() && s.time_step.is_some() => {
+                    let message = "`safety` and `time_step` are both given; only one may be";
+                    self.error(&format!("{path}.time_step"), message, "remove one of them");
+                }
+                Solver::Static(s) | Solver::Newton(s) | Solver::QuasiStatic(s)
+                    if s.linear == LinearSolver::Direct && s.preconditioner.is_some() =>
+                {
+                    let message = "a direct solver has no preconditioner";
+                    self.error(&format!("{path}.preconditioner"), message, "remove it, or choose another `linear`");
+                }
+                _ => {}
+            }
+            if !any && case.physics.elasticity.failure.is_some() {
+                let message = format!(
+                    "no bond breaks in `{path}`; they do in `quasi_static`, `velocity_verlet` and `runge_kutta`"
+                );
+                self.warning(&path, message);
+            }
+            if solver.end_time() <= begins {
+                let message =
+                    format!("ends at {} s, when the solver before it has reached {begins} s", solver.end_time());
+                let help = "time goes on from one solver of a chain to the next: give a later `end_time`";
+                self.error(&format!("{path}.end_time"), message, help);
+            }
+            begins = solver.end_time();
         }
     }
 
@@ -298,6 +353,22 @@ impl Checker<'_> {
                 horizon / spacing
             );
             self.error("discretization.horizon", message, "a ratio of 3 to 5 is usual");
+        }
+    }
+
+    /// Corrections of bodies whose cells have several sizes.
+    fn correction(&mut self, case: &Case) {
+        let (path, correction) = ("discretization.surface_correction", case.discretization.surface_correction);
+        let Some(refinement) = &case.refinement else { return };
+        if correction == SurfaceCorrection::None {
+            return;
+        }
+        if refinement.refine_where.is_some() {
+            let message = "bodies whose cells follow the solution are not corrected: families change as it runs";
+            self.error(path, message, "remove it, or refine by `zones` instead of `refine_where`");
+        } else if correction == SurfaceCorrection::Volume {
+            let message = "where horizons differ the volume of a family does not tell what it lacks";
+            self.error(path, message, "use `energy`");
         }
     }
 

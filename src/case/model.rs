@@ -20,11 +20,13 @@ pub struct Case {
     #[serde(default)]
     pub sets: BTreeMap<String, Region>,
     pub discretization: Discretization,
+    /// Cells of several sizes, from the start or as the solution wants them.
+    pub refinement: Option<Refinement>,
     pub physics: Physics,
     /// What acts on the body.
     #[serde(default)]
     pub conditions: Vec<Condition>,
-    pub solver: Solver,
+    pub solver: Chain,
     /// What is written into the output folder; a history and a report are always written.
     #[serde(default)]
     pub output: Vec<Output>,
@@ -279,11 +281,94 @@ pub struct Discretization {
     /// How much of a neighbour's cell counts where the horizon cuts it.
     #[serde(default)]
     pub partial_volumes: PartialVolumes,
+    /// What is done about points near surfaces, which lack bonds. A lattice that is corrected is computed as a scattered
+    /// cloud, at two to five times the time and 14 bytes a bond.
+    #[serde(default)]
+    pub surface_correction: SurfaceCorrection,
     #[serde(default)]
     pub scheme: Scheme,
     /// What fields are stored in and bonds are computed in.
     #[serde(default)]
     pub precision: Precision,
+}
+
+/// Cells that are split in halves, level by level; the horizon goes with the cell, the micromodulus and the critical
+/// stretch with the horizon.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Refinement {
+    /// The finest level; 0 is the lattice of `geometry.spacing`.
+    #[schemars(range(min = 1, max = 8))]
+    pub levels: u8,
+    /// Where which level is wanted from the start to the end.
+    #[serde(default)]
+    pub zones: Vec<Zone>,
+    /// Where the finest level is wanted: a formula in x, y, z, t and in `energy` (density, over the largest in the body),
+    /// `jump` (largest difference of the displacement gradient to a neighbour), `stretch` (largest of a bond over the
+    /// critical one), `damage`.
+    #[schemars(extend("x-expression" = ["x", "y", "z", "t", "energy", "jump", "stretch", "damage"]))]
+    pub refine_where: Option<Formula>,
+    /// Where cells are not merged again, in the same names; `damage > 0` if not given.
+    #[schemars(extend("x-expression" = ["x", "y", "z", "t", "energy", "jump", "stretch", "damage"]))]
+    pub keep_where: Option<Formula>,
+    /// Steps between two looks at `refine_where`.
+    #[serde(default = "ten_steps")]
+    #[schemars(range(min = 1))]
+    pub every_steps: u64,
+    /// No coarser point is within this many horizons of its own of a place where finer cells are wanted.
+    #[serde(default = "six")]
+    #[schemars(range(min = 0, max = 100))]
+    pub buffer: f64,
+    #[serde(default)]
+    pub transition: GridTransition,
+    #[serde(default)]
+    pub rule: HorizonRule,
+}
+
+/// A region and the level wanted in it.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Zone {
+    pub region: Region,
+    #[schemars(range(min = 1, max = 8))]
+    pub level: u8,
+}
+
+/// How cells and horizons change between zones.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum GridTransition {
+    /// At once, however many levels.
+    Sudden,
+    /// Cells that touch differ by one level at most.
+    #[default]
+    Stepwise,
+    /// As stepwise, and the horizon falls off within the fine cells by `slope` times the way, instead of jumping.
+    Smooth {
+        #[schemars(range(min = 0.05, max = 10))]
+        slope: f64,
+    },
+}
+
+/// Whose horizon and micromodulus a bond has.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum HorizonRule {
+    /// Those of the point whose force is summed; momentum is not kept where horizons differ.
+    Source,
+    /// The mean of both ends' micromoduli.
+    Average,
+    /// Dual horizons: half the force of either end's family, and its reaction.
+    #[default]
+    Dual,
+}
+
+fn ten_steps() -> u64 {
+    10
+}
+
+fn six() -> f64 {
+    6.0
 }
 
 /// Influence functions, t = |ξ|/δ.
@@ -323,6 +408,19 @@ pub enum PartialVolumes {
     Ramp,
     /// The exact part of the cell inside the horizon.
     Exact,
+}
+
+/// Surface corrections: factors of bonds that have an end near a surface.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SurfaceCorrection {
+    /// None: points near surfaces are too soft.
+    #[default]
+    None,
+    /// By the volume of a complete family over the mean of both ends'.
+    Volume,
+    /// By the energy of a complete family over that of both ends, for each direction.
+    Energy,
 }
 
 /// Precisions of fields and bonds.
@@ -507,13 +605,64 @@ pub enum Load {
     },
 }
 
+/// One solver, or several that follow each other.
+///
+/// A list is `[{ static = { ... } }, { velocity_verlet = { ... } }]`, or several `[[solver]]` tables. Each begins with the
+/// displacements and the bonds that the one before it left. Time goes on, so that `end_time` ascends.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Chain {
+    One(Solver),
+    Several(#[schemars(length(min = 1))] Vec<Solver>),
+}
+
+impl Chain {
+    /// The solvers, each with its key path.
+    pub fn stages(&self) -> impl Iterator<Item = (String, &Solver)> {
+        let (list, single) = match self {
+            Chain::One(solver) => (std::slice::from_ref(solver), true),
+            Chain::Several(list) => (&list[..], false),
+        };
+        let path = move |(k, solver): (usize, &'_ Solver)| {
+            let name = solver.name();
+            if single { format!("solver.{name}") } else { format!("solver[{k}].{name}") }
+        };
+        list.iter().enumerate().map(move |(k, solver)| (path((k, solver)), solver))
+    }
+}
+
+impl Solver {
+    /// The key that chooses it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Solver::VelocityVerlet(_) => "velocity_verlet",
+            Solver::RungeKutta(_) => "runge_kutta",
+            Solver::Static(_) => "static",
+            Solver::Newton(_) => "newton",
+            Solver::DynamicRelaxation(_) => "dynamic_relaxation",
+            Solver::QuasiStatic(_) => "quasi_static",
+        }
+    }
+
+    /// s
+    pub fn end_time(&self) -> f64 {
+        match self {
+            Solver::VelocityVerlet(s) | Solver::RungeKutta(s) => s.end_time,
+            Solver::Static(s) | Solver::Newton(s) | Solver::QuasiStatic(s) => s.end_time,
+            Solver::DynamicRelaxation(s) => s.end_time,
+        }
+    }
+}
+
 /// How time advances, or how the body comes to rest. The static solvers take load steps: time is what conditions are
 /// given in, and nothing moves by itself.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Solver {
-    /// Explicit, second order.
-    VelocityVerlet(VelocityVerlet),
+    /// Explicit, second order; one sum over bonds a step.
+    VelocityVerlet(Explicit),
+    /// Explicit, fourth order; four sums over bonds a step, which may be √2 times as long.
+    RungeKutta(Explicit),
     /// Equilibrium at small displacements: the law linearised at rest. No bond breaks.
     Static(Statics),
     /// Equilibrium of the law as it is, by Newton's method. No bond breaks.
@@ -545,10 +694,45 @@ pub struct Statics {
     #[serde(default = "newton_iterations")]
     #[schemars(range(min = 1))]
     pub max_iterations: usize,
-    /// Iterations of conjugate gradients in each of these.
+    /// How the linear system in each of these is solved.
+    #[serde(default)]
+    pub linear: LinearSolver,
+    /// Of the Krylov methods; `jacobi` if not given.
+    pub preconditioner: Option<Preconditioner>,
+    /// Iterations of the linear solver in each system.
     #[serde(default = "many_iterations")]
     #[schemars(range(min = 1))]
     pub max_linear: usize,
+}
+
+/// Solvers of linear systems.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LinearSolver {
+    /// Without a matrix; for stable bodies, whose tangent is symmetric and positive.
+    #[default]
+    ConjugateGradients,
+    /// Sparse factors of the assembled tangent: 2D, or 3D below some 30 000 unknowns.
+    Direct,
+    /// For any tangent.
+    Bicgstab,
+    /// For any tangent; safer and in more memory.
+    Gmres,
+}
+
+/// Preconditioners of linear systems.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Preconditioner {
+    /// The diagonal of the tangent.
+    #[default]
+    Jacobi,
+    /// The block of each point on the diagonal.
+    BlockJacobi,
+    /// Incomplete factors of the assembled tangent: fewer iterations, at some hundred bytes a bond.
+    IncompleteFactors,
+    /// None.
+    None,
 }
 
 /// Parameters of dynamic relaxation.
@@ -589,11 +773,11 @@ fn many_iterations() -> usize {
     100_000
 }
 
-/// Parameters of velocity Verlet.
+/// Parameters of explicit solvers.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct VelocityVerlet {
-    /// The instant at which the run ends.
+pub struct Explicit {
+    /// The instant at which it ends.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
     pub end_time: f64,
     /// Δt as a fraction of the stable step that is estimated from the discretisation (0.8 if not given). Either this or

@@ -133,7 +133,14 @@ impl<'a> Validator<'a> {
                 let help = format!("did you mean `{name}`?");
                 return self.report(diagnostic.allowed(allowed).help(help));
             }
-            return match union.iter().find(|l| l.fits(node)) {
+            // A table that names no choice is meant for the only alternative that is one by tables.
+            let tables: Vec<_> = union.iter().filter(|l| l.variants().is_some()).collect();
+            let meant = match (&node.value, &tables[..]) {
+                (NodeValue::Table(_), [one]) => Some(*one),
+                _ => None,
+            };
+            let meant = meant.filter(|_| !union.iter().any(|l| l.kinds() == ["object"]));
+            return match union.iter().find(|l| l.fits(node)).or(meant) {
                 Some(chosen) => self.check_layers(node, chosen, context, path),
                 None => self.wrong_kind(node, layers, context, path),
             };

@@ -99,4 +99,15 @@ impl Load {
         }
         done
     }
+
+    /// Work and impulse of the force that was last added, over `weight` (s) of the motion with these velocities.
+    pub fn book<T: Number>(&self, weight: f64, velocity: &[T], volume: impl Fn(usize) -> f64) -> Done {
+        let mut done = Done::default();
+        for (&slot, b) in self.slots.iter().zip(self.last.iter().flat_map(|last| &last.force)) {
+            let impulse = weight * b * volume(slot as usize);
+            done.impulse += impulse;
+            done.work += impulse * velocity[slot as usize].to_f64();
+        }
+        done
+    }
 }

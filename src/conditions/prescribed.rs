@@ -45,9 +45,24 @@ pub struct Prescribed {
     /// u of each point before it is rounded to the numbers of the field, m: roundings of thousands of equal steps would
     /// all go the same way.
     pub path: Vec<f64>,
+    /// Impulse over the stages of a step so far, N·s.
+    pub so_far: f64,
 }
 
+/// Of `until`: times that are sums of steps reach it to rounding only.
+const SLACK: f64 = 1e-9;
+
 impl Prescribed {
+    /// Whether it holds in a load step that ends at `t`.
+    pub fn holds(&self, t: f64) -> bool {
+        t <= self.until * (1.0 + SLACK)
+    }
+
+    /// Whether it goes on holding after `t`.
+    pub fn goes_on(&self, t: f64) -> bool {
+        t < self.until * (1.0 - SLACK)
+    }
+
     /// Sets the velocities with which the set drifts over the step from `t` to `t + dt`, and where they lead from the
     /// displacements at its start.
     pub fn drift<T: Number>(&mut self, t: f64, dt: f64, displacement: &mut [T], velocity: &mut [T]) {
@@ -112,6 +127,98 @@ impl Prescribed {
             *last = [u, v, f];
         }
         self.reaction = done.impulse / dt;
+        done
+    }
+
+    /// Sets the values of time `t` at a stage of a step of `dt` that ends at `end`, where other stages lead from it. A
+    /// prescribed velocity is integrated by the solver, as any other.
+    pub fn stage<T: Number>(&mut self, t: f64, end: f64, dt: f64, displacement: &mut [T], velocity: &mut [T]) {
+        if end > self.until {
+            return;
+        }
+        match self.quantity {
+            Quantity::Velocity => {
+                for (&slot, v) in self.slots.iter().zip(self.profile.at(t)) {
+                    velocity[slot as usize] = T::from_f64(*v);
+                }
+            }
+            Quantity::Displacement => {
+                // The slope of the formula at t, of fourth order as the method.
+                let mut slope = vec![0.0; self.slots.len()];
+                for (at, weight) in [(-1.0, 1.0), (-0.5, -8.0), (0.5, 8.0), (1.0, -1.0)] {
+                    for (slope, u) in slope.iter_mut().zip(self.profile.at(t + at * dt)) {
+                        *slope += weight * u / (6.0 * dt);
+                    }
+                }
+                for ((&slot, v), u) in self.slots.iter().zip(&slope).zip(self.profile.at(t)) {
+                    displacement[slot as usize] = T::from_f64(*u);
+                    velocity[slot as usize] = T::from_f64(*v);
+                }
+            }
+        }
+    }
+
+    /// Takes the work and impulse of all other forces, over `weight` (s) of what acts now, off those of the constraint.
+    /// `step` is the one that goes on.
+    pub fn book<T: Number>(
+        &mut self,
+        weight: f64,
+        step: &Step,
+        velocity: &[T],
+        force: &[T],
+        volume: impl Fn(usize) -> f64,
+    ) -> Done {
+        let mut done = Done::default();
+        if step.t > self.until {
+            return done;
+        }
+        for &slot in self.slots.iter() {
+            let slot = slot as usize;
+            let [v, f] = [velocity[slot], force[slot]].map(T::to_f64);
+            let impulse = weight * (step.inertia * step.damping * v - f) * volume(slot);
+            done.impulse += impulse;
+            done.work += impulse * v;
+        }
+        self.so_far += done.impulse;
+        done
+    }
+
+    /// At the end of a step with stages: sets the values there, and accounts for the change of momentum and kinetic
+    /// energy, which with what [`Prescribed::book`] took off is what the constraint did.
+    pub fn arrive<T: Number>(
+        &mut self,
+        step: &Step,
+        displacement: &mut [T],
+        velocity: &mut [T],
+        volume: impl Fn(usize) -> f64,
+    ) -> Done {
+        let mut done = Done::default();
+        let so_far = std::mem::take(&mut self.so_far);
+        let Step { t, dt, inertia, .. } = *step;
+        if t > self.until {
+            self.reaction = 0.0;
+            return done;
+        }
+        self.stage(t, t, dt, displacement, velocity);
+        if self.quantity == Quantity::Velocity {
+            // What the four stages make of it.
+            for (at, weight) in [(1.0, 1.0), (0.5, 4.0), (0.0, 1.0)] {
+                for (u, v) in self.path.iter_mut().zip(self.profile.at(t - at * dt)) {
+                    *u += weight / 6.0 * dt * v;
+                }
+            }
+            for (&slot, u) in self.slots.iter().zip(&self.path) {
+                displacement[slot as usize] = T::from_f64(*u);
+            }
+        }
+        for (&slot, last) in self.slots.iter().zip(&mut self.last) {
+            let slot = slot as usize;
+            let [u, v] = [displacement[slot], velocity[slot]].map(T::to_f64);
+            done.impulse += inertia * (v - last[1]) * volume(slot);
+            done.work += 0.5 * inertia * (v * v - last[1] * last[1]) * volume(slot);
+            *last = [u, v, last[2]];
+        }
+        self.reaction = (done.impulse + so_far) / dt;
         done
     }
 

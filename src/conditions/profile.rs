@@ -31,6 +31,11 @@ impl Profile {
         Profile { expression, columns, values: vec![0.0; slots.len()], moves, ready: false }
     }
 
+    /// The same formula at the points of another set.
+    pub fn on<const D: usize>(&self, cloud: &Cloud<D>, slots: &Arc<[u32]>) -> Self {
+        Profile::new(self.expression.clone(), cloud, slots)
+    }
+
     /// The values at time `t`, in the order of the set.
     pub fn at(&mut self, t: f64) -> &[f64] {
         if self.moves || !self.ready {

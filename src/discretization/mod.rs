@@ -1,11 +1,15 @@
-//! Which weights at which points: influence functions, partial volumes, schemes.
+//! Which weights at which points: influence functions, partial volumes, schemes, surface corrections.
 
+pub mod graded;
 pub mod influence;
 pub mod moments;
 pub(crate) mod quadrature;
 pub mod standard;
+pub mod surface;
 pub mod volume;
 
+pub use graded::Scaling;
 pub use influence::Influence;
 pub use standard::{BondWeights, Operator};
+pub use surface::Correction;
 pub use volume::PartialVolume;

@@ -2,7 +2,8 @@
 //!
 //! Shojaei et al. 2022, eqs. (26)–(28). On a lattice the weights are one list, shared by all points. On a cloud they
 //! are recomputed from the bond's length whenever it is visited; only the exact partial volumes, which are dear, are
-//! stored, as 16-bit fractions (resolution 1.5e-5, the same number at both ends of a bond).
+//! stored, as 16-bit fractions (resolution 1.5e-5, the same number at both ends of a bond). Where every bond has a weight
+//! of its own, it is stored.
 
 use std::sync::Arc;
 
@@ -55,6 +56,8 @@ pub struct Profile<'a> {
     pub ramp: Option<[f64; 2]>,
     /// β × 65535 by bond.
     pub fractions: Option<&'a [u16]>,
+    /// Instead of all of the above: the weight by bond and unit of volume, and the unit in which volumes are given.
+    pub stored: Option<(&'a [f64], f64)>,
     /// A square of length that vanishes beside |ξ|² in the numbers of the precision, m².
     pub negligible_square: f64,
 }
@@ -65,6 +68,8 @@ enum Fractions {
     Ramp,
     /// β × 65535 by bond.
     Stored(Arc<[u16]>),
+    /// Strength × ω × β by bond.
+    Weights(Arc<[f64]>),
 }
 
 /// A body for the standard scheme: families that hold every x′ whose cell reaches into the horizon of x.
@@ -133,12 +138,38 @@ impl Operator {
         match &self.weights {
             BondWeights::Lattice(weights) => 2 * 8 * weights.len(),
             BondWeights::Cloud(CloudWeights { fractions: Fractions::Stored(f), .. }) => 2 * f.len(),
+            BondWeights::Cloud(CloudWeights { fractions: Fractions::Weights(w), .. }) => (2 + 8) * w.len(),
             BondWeights::Cloud(_) => 0,
+        }
+    }
+
+    /// The weights by bond, and the fractions of the volumes, where these are stored.
+    pub(crate) fn stored(&self) -> Option<(&[f64], &[u16])> {
+        match (&self.weights, &self.volumes) {
+            (
+                BondWeights::Cloud(CloudWeights { fractions: Fractions::Weights(weights), .. }),
+                BondWeights::Cloud(CloudWeights { fractions: Fractions::Stored(fractions), .. }),
+            ) => Some((weights, fractions)),
+            _ => None,
         }
     }
 }
 
 impl CloudWeights {
+    /// A weight of its own for each bond, per unit of the volume at its other end; `horizon`: the smallest, m.
+    pub(super) fn by_bond(weights: Arc<[f64]>, horizon: f64) -> Self {
+        Self::alone(Fractions::Weights(weights), horizon)
+    }
+
+    /// β × 65535 by bond, and no influence.
+    pub(super) fn by_fraction(fractions: Arc<[u16]>, horizon: f64) -> Self {
+        Self::alone(Fractions::Stored(fractions), horizon)
+    }
+
+    fn alone(fractions: Fractions, horizon: f64) -> Self {
+        CloudWeights { strength: 1.0, influence: Influence::Constant, horizon, spacing: horizon, fractions }
+    }
+
     /// The same weights for many bonds side by side, with volumes in multiples of `volume_unit` (m³ in 3D) and numbers
     /// of `single` or double precision.
     pub fn profile(&self, volume_unit: f64, single: bool) -> Profile<'_> {
@@ -149,13 +180,18 @@ impl CloudWeights {
             Fractions::Stored(fractions) => Some(&fractions[..]),
             _ => None,
         };
+        let stored = match &self.fractions {
+            Fractions::Weights(weights) => Some((&weights[..], volume_unit)),
+            _ => None,
+        };
         Profile {
-            plain: self.influence == Influence::Constant && ramp.is_none() && fractions.is_none(),
+            plain: matches!((self.influence, &self.fractions), (Influence::Constant, Fractions::Full)),
             singly: terms.is_none(),
             influence: terms.unwrap_or_default().map(|c| c * self.strength * volume_unit),
             inverse_horizon: 1.0 / self.horizon,
             ramp,
             fractions,
+            stored,
             negligible_square: self.horizon * self.horizon * if single { 1e-12 } else { 1e-25 },
         }
     }
@@ -167,6 +203,7 @@ impl CloudWeights {
             Fractions::Full => 1.0,
             Fractions::Ramp => super::volume::ramp(length, self.spacing, self.horizon),
             Fractions::Stored(fractions) => f64::from(fractions[bond]) / 65535.0,
+            Fractions::Weights(weights) => return weights[bond] * volume,
         };
         self.strength * self.influence.quadrature_value(length / self.horizon) * fraction * volume
     }

@@ -86,6 +86,15 @@ impl PartialVolume {
         }
     }
 
+    /// β where it follows from |ξ| alone; else None.
+    pub fn radial(&self, length: f64, spacing: f64, horizon: f64) -> Option<f64> {
+        match self {
+            PartialVolume::None => Some(if length <= horizon * (1.0 + RIM_TOLERANCE) { 1.0 } else { 0.0 }),
+            PartialVolume::Ramp => Some(ramp(length, spacing, horizon)),
+            PartialVolume::Exact => None,
+        }
+    }
+
     /// Volume fraction β of the cell of side `spacing` centred at `xi` from the source, for the
     /// ball of radius `horizon`.
     ///
@@ -93,17 +102,8 @@ impl PartialVolume {
     /// `spacing` is the neighbour's V^(1/D).
     pub fn fraction<const D: usize>(&self, xi: &[f64; D], spacing: f64, horizon: f64) -> f64 {
         let distances = sorted(xi);
-        match self {
-            PartialVolume::None => {
-                if norm(distances) <= horizon * (1.0 + RIM_TOLERANCE) {
-                    1.0
-                } else {
-                    0.0
-                }
-            }
-            PartialVolume::Ramp => ramp(norm(distances), spacing, horizon),
-            PartialVolume::Exact => exact(distances, spacing, horizon),
-        }
+        let radial = self.radial(norm(distances), spacing, horizon);
+        radial.unwrap_or_else(|| exact(distances, spacing, horizon))
     }
 }
 

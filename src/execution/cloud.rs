@@ -182,6 +182,14 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         if PLAIN {
             return volume * V::splat(profile.influence[0]);
         }
+        if let Some((stored, unit)) = profile.stored {
+            let mut weights = [P::Bond::default(); GROUP];
+            for (weight, stored) in weights[..V::LANES].iter_mut().zip(&stored[first..]) {
+                *weight = P::Bond::from_f64(stored * unit);
+            }
+            // SAFETY: a pack has at most `GROUP` lanes.
+            return volume * unsafe { V::load(weights.as_ptr()) };
+        }
         if profile.singly {
             return self.weigh_singly(first, length, volume);
         }

@@ -46,7 +46,9 @@ macro_rules! compiled {
     };
 }
 
+mod blocks;
 mod cloud;
+pub mod gradients;
 mod lattice;
 pub mod machine;
 mod packs;
@@ -60,6 +62,7 @@ use crate::discretization::BondWeights;
 use crate::family::{Body, Bond, BondKernel, BondStates, Families};
 use crate::field::Number;
 use crate::lane::Lane;
+pub use blocks::BlockRow;
 pub use packs::{Instructions, Packs};
 
 /// Which bonds break: asked only about bonds strained beyond `threshold`, in the strain of the kernel.

@@ -80,4 +80,6 @@ pub trait BondLaw<const D: usize>: Copy + Send + Sync {
     }
     /// Spring constant of the bond at rest, weighted: derivative of the force along ξ by η along ξ.
     fn tangent<L: Lane>(&self, length: L, weight: L) -> L;
+    /// ∂force/∂η, exactly: row by row the change of each component of the force, weighted.
+    fn stiffness(&self, bond: &Bond<D, f64>, eta: &[f64; D]) -> [[f64; D]; D];
 }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use super::graded::Grading;
 use super::search;
 use crate::field::{Vector, norm};
 use crate::geometry::lattice::BLOCK;
@@ -13,8 +14,10 @@ use crate::geometry::{Arrangement, Cloud, Lattice};
 pub struct Body<const D: usize> {
     pub cloud: Cloud<D>,
     pub families: Families<D>,
-    /// δ, m.
+    /// δ, m; the largest where they differ.
     pub horizon: f64,
+    /// Where horizons differ from point to point.
+    pub grading: Option<Grading>,
 }
 
 /// Who sees whom.
@@ -97,7 +100,7 @@ pub struct FixedSites {
 }
 
 impl Sites {
-    fn new<const D: usize>(positions: &[Vector<D>], volumes: &[f64]) -> Self {
+    pub(super) fn new<const D: usize>(positions: &[Vector<D>], volumes: &[f64]) -> Self {
         let record = |(x, v): (&Vector<D>, &f64)| {
             let mut record = [0.0, 0.0, 0.0, *v];
             record[..D].copy_from_slice(x);
@@ -142,12 +145,12 @@ impl<const D: usize> Body<D> {
                 Families::Lattice(LatticeFamilies::new(lattice, &cloud.slots, rim, accept))
             }
             Arrangement::Scattered { positions, volumes } => {
-                let mut families = search::families(positions, rim, accept);
+                let mut families = search::families(positions, rim, |_, _, xi| accept(xi));
                 families.sites = Sites::new(positions, volumes);
                 Families::Cloud(families)
             }
         };
-        Body { cloud, families, horizon }
+        Body { cloud, families, horizon, grading: None }
     }
 }
 

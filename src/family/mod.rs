@@ -2,10 +2,12 @@
 
 pub mod bond;
 pub mod families;
+pub mod graded;
 pub mod search;
 pub mod states;
 mod tree;
 
 pub use bond::{Bond, BondKernel, BondLaw};
 pub use families::{Body, Class, CloudFamilies, Families, FixedSites, GROUP, LatticeFamilies, Offset, Sites};
+pub use graded::{Grading, Rule, Update};
 pub use states::BondStates;

@@ -18,11 +18,12 @@ const BLOCK: usize = FAN * FAN;
 /// Points whose families are kept twice for a moment.
 const WAVE: usize = 256 * PIECE;
 
-/// The families of a scattered cloud: x′ ≠ x with |ξ| ≤ `rim.start`, or with |ξ| ≤ `rim.end` and `accept(ξ)`; ascending.
+/// The families of a scattered cloud: x′ ≠ x with |ξ| ≤ `rim.start`, or with |ξ| ≤ `rim.end` and `accept(x, x′, ξ)`, the
+/// first two by their places in `positions`; ascending.
 pub fn families<const D: usize>(
     positions: &[Vector<D>],
     rim: Range<f64>,
-    accept: impl Fn(&Vector<D>) -> bool + Sync,
+    accept: impl Fn(usize, usize, &Vector<D>) -> bool + Sync,
 ) -> CloudFamilies {
     let search = Search { positions, tree: Tree::new(positions), rim, accept };
     let n = positions.len();
@@ -51,11 +52,22 @@ pub fn families<const D: usize>(
     CloudFamilies { starts, neighbours, sites: Sites::default() }
 }
 
+/// The families of some points only, as [`families`] has them: of ranges of consecutive ones.
+pub fn pieces<const D: usize>(
+    positions: &[Vector<D>],
+    ranges: Vec<Range<usize>>,
+    rim: Range<f64>,
+    accept: impl Fn(usize, usize, &Vector<D>) -> bool + Sync,
+) -> Vec<Piece> {
+    let search = Search { positions, tree: Tree::new(positions), rim, accept };
+    ranges.into_par_iter().map_init(Scratch::default, |scratch, range| search.piece(range, scratch)).collect()
+}
+
 /// The families of some consecutive points.
-struct Piece {
+pub struct Piece {
     /// One past the last group of each point, counted from the first of the piece.
-    ends: Vec<u64>,
-    neighbours: Vec<u32>,
+    pub ends: Vec<u64>,
+    pub neighbours: Vec<u32>,
 }
 
 /// What is searched, and for whom.
@@ -76,7 +88,7 @@ struct Scratch<const D: usize> {
     row: Vec<u32>,
 }
 
-impl<const D: usize, F: Fn(&Vector<D>) -> bool> Search<'_, D, F> {
+impl<const D: usize, F: Fn(usize, usize, &Vector<D>) -> bool> Search<'_, D, F> {
     /// The families of `points`.
     fn piece(&self, points: Range<usize>, scratch: &mut Scratch<D>) -> Piece {
         let mut piece = Piece { ends: Vec::with_capacity(points.len()), neighbours: Vec::new() };
@@ -146,7 +158,7 @@ impl<const D: usize, F: Fn(&Vector<D>) -> bool> Search<'_, D, F> {
             for (&j, &square) in narrow.slots.iter().zip(&*squares) {
                 let accepted = || {
                     let xi = difference(&self.positions[j as usize], x);
-                    norm(&xi) <= self.rim.end && (self.accept)(&xi)
+                    norm(&xi) <= self.rim.end && (self.accept)(i, j as usize, &xi)
                 };
                 if square <= sure || square <= limit && accepted() {
                     row[found] = j;
@@ -276,7 +288,7 @@ mod tests {
             panic!("a scattered cloud")
         };
         for (order, positions) in [("as given", positions), ("along the curve", along)] {
-            let found = families(&positions, rim.clone(), accept);
+            let found = families(&positions, rim.clone(), |_, _, xi| accept(xi));
             assert_eq!(found.starts.len(), n + 1);
             for (i, x) in positions.iter().enumerate() {
                 let is_neighbour = |&j: &u32| {
@@ -348,7 +360,7 @@ mod tests {
             else {
                 panic!("a scattered cloud")
             };
-            let found = pool.install(|| families(&positions, 0.004..0.005, |xi| xi[0] * xi[1] > 0.0));
+            let found = pool.install(|| families(&positions, 0.004..0.005, |_, _, xi| xi[0] * xi[1] > 0.0));
             (found.starts, found.neighbours)
         };
         let one = found(1);

@@ -74,6 +74,21 @@ impl<const D: usize> Cloud<D> {
         }
     }
 
+    /// The same points, cells of no lattice any more; sets are left behind.
+    pub fn scatter(&self) -> Self {
+        let slots = self.slots.iter().map(|&slot| slot as usize);
+        let positions = slots.clone().map(|slot| self.position(slot)).collect();
+        Cloud { spacing: self.spacing, ..Cloud::scattered(positions, slots.map(|slot| self.volume(slot)).collect()) }
+    }
+
+    /// Points that lie along a curve already, so that slots are in point order.
+    pub fn along_curve(positions: Vec<Vector<D>>, volumes: Vec<f64>) -> Self {
+        let slots = (0..positions.len() as u32).collect();
+        let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
+        let arrangement = Arrangement::Scattered { positions, volumes };
+        Cloud { arrangement, slots, spacing: mean.powf(1.0 / D as f64), sets: PointSets::default() }
+    }
+
     pub fn n_points(&self) -> usize {
         self.slots.len()
     }

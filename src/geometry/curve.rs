@@ -47,7 +47,28 @@ pub fn order<const D: usize>(positions: &[Vector<D>]) -> Vec<u32> {
     points
 }
 
+/// A curve through the cells of a grid and of all coarser ones: all cells within a coarser cell follow each other.
+#[derive(Debug, Clone)]
+pub struct Curve<const D: usize> {
+    courses: Courses<D>,
+    bits: u32,
+}
+
+impl<const D: usize> Curve<D> {
+    /// Through 2^`bits` cells a side.
+    pub fn new(bits: u32) -> Self {
+        assert!(bits * D as u32 <= 64, "numbers on the curve have 64 bits");
+        Curve { courses: Courses::new(), bits }
+    }
+
+    /// The number of the first cell within a cell of the grid that is 2^`coarser` times as coarse.
+    pub fn index(&self, cell: [u64; D], coarser: u32) -> u64 {
+        self.courses.index(cell, self.bits - coarser) << (D as u32 * coarser)
+    }
+}
+
 /// The ways in which the curve can run through a cube, each given by the corner where it enters and an axis.
+#[derive(Debug, Clone)]
 struct Courses<const D: usize> {
     /// By course and corner: the corner's turn, and the course through the smaller cube there.
     turns: Vec<[u8; 2]>,

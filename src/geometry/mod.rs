@@ -2,7 +2,7 @@
 
 pub mod cloud;
 pub mod cracks;
-mod curve;
+pub mod curve;
 pub mod lattice;
 mod polygon;
 pub mod sets;

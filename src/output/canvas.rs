@@ -30,18 +30,44 @@ pub struct Image {
     pub pixels: Vec<Color>,
 }
 
+impl Image {
+    /// This image and another one of the same width below it.
+    pub fn above(mut self, below: Image) -> Image {
+        assert_eq!(self.width, below.width, "images that are put together are equally wide");
+        self.height += below.height;
+        self.pixels.extend(below.pixels);
+        self
+    }
+}
+
 /// Writes an image as PNG.
 ///
 /// The file appears under its name only when it is complete.
 pub fn write_png(image: &Image, path: &Path) -> io::Result<()> {
+    write_frames(std::slice::from_ref(image), path)
+}
+
+/// Writes images of one size as one PNG that plays them over and over, ten a second.
+pub fn write_animation(images: &[Image], path: &Path) -> io::Result<()> {
+    write_frames(images, path)
+}
+
+fn write_frames(images: &[Image], path: &Path) -> io::Result<()> {
     let size = |length: usize| u32::try_from(length).map_err(io::Error::other);
+    let first = images.first().ok_or_else(|| io::Error::other("an animation has a frame at least"))?;
     write_whole(path, |file| {
-        let mut encoder = png::Encoder::new(file, size(image.width)?, size(image.height)?);
+        let mut encoder = png::Encoder::new(file, size(first.width)?, size(first.height)?);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::Fast);
+        if images.len() > 1 {
+            encoder.set_animated(size(images.len())?, 0)?;
+            encoder.set_frame_delay(1, 10)?;
+        }
         let mut writer = encoder.write_header()?;
-        writer.write_image_data(image.pixels.as_flattened())?;
+        for image in images {
+            writer.write_image_data(image.pixels.as_flattened())?;
+        }
         writer.finish()?;
         Ok(())
     })

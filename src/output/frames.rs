@@ -1,8 +1,10 @@
 //! VTU frames and the PVD collection that plays them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::snapshot::{Snapshot, Wants};
+use super::source::Points;
 use super::vtu::{FieldData, Grid, Precision, write_pvd, write_vtu};
 use super::writer::Writer;
 use crate::error::{Error, Result};
@@ -12,8 +14,8 @@ use crate::field::Values;
 pub struct Frames {
     folder: PathBuf,
     fields: Vec<&'static str>,
-    /// What all frames share, packed for the first.
-    grid: Option<Grid>,
+    /// What frames of the same points share, packed for the first of them.
+    grid: Option<(Arc<Points>, Grid)>,
     written: Vec<(f64, String)>,
 }
 
@@ -25,7 +27,7 @@ impl Frames {
 
 impl Writer for Frames {
     fn wants(&self) -> Wants {
-        Wants { fields: self.fields.clone(), point: None }
+        Wants::everywhere(self.fields.clone())
     }
 
     fn write(&mut self, snapshot: &Snapshot) -> Result<()> {
@@ -43,7 +45,11 @@ impl Writer for Frames {
             std::fs::create_dir_all(parent).map_err(|e| Error::io(parent, e))?;
         }
         let time = snapshot.clock.time();
-        let grid = self.grid.get_or_insert_with(|| Grid::new(&snapshot.points.positions, Precision::Float64));
+        let points = &snapshot.points;
+        let grid = match &mut self.grid {
+            Some((of, grid)) if Arc::ptr_eq(of, points) => grid,
+            other => &mut other.insert((points.clone(), Grid::new(&points.positions, Precision::Float64))).1,
+        };
         write_vtu(&path, grid, &data, time).map_err(|e| Error::io(&path, e))?;
         self.written.push((time, name));
         let pvd = self.folder.join("fields.pvd");

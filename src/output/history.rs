@@ -66,6 +66,9 @@ impl History {
             columns.extend(axes.iter().map(|a| format!("crack_tip_{a}")));
             columns.push("crack_tip_speed".into());
         }
+        if source.adapted().is_some() {
+            columns.extend(["points", "refined"].map(String::from));
+        }
         columns.extend(source.reactions().iter().map(|(name, _)| format!("reaction_{name}")));
         Table::new(&self.path, columns)
     }
@@ -107,6 +110,9 @@ impl History {
         if let Some(tip) = &self.tip {
             row.extend(&tip.position.unwrap_or([f64::NAN; 3])[..dimension]);
             row.push(tip.speed);
+        }
+        if look.source.adapted().is_some() {
+            row.extend([look.source.facts().points as f64, b.refined]);
         }
         row.extend(look.source.reactions().iter().map(|(_, value)| value));
         Some(row)

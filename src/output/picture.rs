@@ -11,7 +11,7 @@ use super::plot::{PIXELS, Plot, Series, Style, draw_plot};
 use super::solid;
 use super::ticks::{Axis, drawable, quantity, scaled_label, span, widened};
 
-pub use super::canvas::{Color, Image, write_png};
+pub use super::canvas::{Color, Image, write_animation, write_png};
 
 /// How a picture is to look.
 #[derive(Clone, Debug, PartialEq)]

@@ -34,7 +34,7 @@ impl Writer for Pictures {
         if self.deform != 0.0 && self.field != "displacement" {
             fields.push("displacement");
         }
-        Wants { fields, point: None }
+        Wants::everywhere(fields)
     }
 
     fn write(&mut self, snapshot: &Snapshot) -> Result<()> {

@@ -6,29 +6,26 @@ use super::snapshot::{Snapshot, Wants};
 use super::table::Table;
 use super::writer::Writer;
 use crate::error::Result;
-use crate::field::{Values, difference, norm};
+use crate::field::Values;
 
 /// Writes `probe_<name>.csv` with the fields of the point nearest to a place.
 pub struct Probe {
     path: PathBuf,
-    point: Option<usize>,
+    at: [f64; 3],
     fields: Vec<&'static str>,
     table: Option<Table>,
 }
 
 impl Probe {
-    /// `at` in m, among the points at `positions`.
-    pub fn new(path: PathBuf, positions: &[[f64; 3]], at: [f64; 3], fields: Vec<&'static str>) -> Self {
-        let far = |x: &[f64; 3]| norm(&difference(x, &at));
-        let point = (0..positions.len()).min_by(|&a, &b| far(&positions[a]).total_cmp(&far(&positions[b])));
-        Probe { path, point, fields, table: None }
+    /// `at` in m.
+    pub fn new(path: PathBuf, at: [f64; 3], fields: Vec<&'static str>) -> Self {
+        Probe { path, at, fields, table: None }
     }
 }
 
 impl Writer for Probe {
     fn wants(&self) -> Wants {
-        let fields = if self.point.is_some() { self.fields.clone() } else { Vec::new() };
-        Wants { fields, point: self.point }
+        Wants::at(self.fields.clone(), self.at)
     }
 
     fn write(&mut self, snapshot: &Snapshot) -> Result<()> {

@@ -5,6 +5,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::physics::elasticity::surface::SurfaceEffect;
+use crate::solver::statics::LoadStep;
 
 /// The report of a run; SI units.
 #[derive(Debug, Clone, Serialize, PartialEq)]
@@ -27,6 +29,7 @@ pub struct Report {
     pub micromodulus: f64,
     /// The smallest of the body; null if bonds never break.
     pub critical_stretch: Option<f64>,
+    pub surface: SurfaceEffect,
     pub steps: u64,
     /// s
     pub time_step: f64,
@@ -48,7 +51,28 @@ pub struct Report {
     /// Points with φ > 0.35.
     pub damaged_points: usize,
     pub crack_tip: Option<Tip>,
+    /// Null where cells do not follow the solution.
+    pub refinement: Option<Refinement>,
+    /// Of static solvers, the one that was not finished included; empty for others.
+    pub load_steps: Vec<LoadStep>,
     pub state_hash: String,
+}
+
+/// What refinement has done.
+#[derive(Debug, Clone, Copy, Serialize, PartialEq)]
+pub struct Refinement {
+    /// Times that points were replaced.
+    pub events: u64,
+    /// The most points at any time, and the mean over all looks.
+    pub most_points: u64,
+    pub mean_points: f64,
+    /// Energy that came in by that, J, and the sum of its magnitudes.
+    pub energy: f64,
+    pub energy_turnover: f64,
+    /// Fraction of all families, over all events.
+    pub families_found_anew: f64,
+    /// Points that saw, with a larger horizon, a place where finer cells were wanted: the most at any time.
+    pub points_seen_by_coarser: usize,
 }
 
 /// Where the time went. The first three follow each other; writing goes on beside them.
@@ -70,6 +94,8 @@ pub struct Energy {
     pub fracture: f64,
     pub external: f64,
     pub damped: f64,
+    /// Came in when cells were split and merged.
+    pub refined: f64,
     pub initial: f64,
 }
 

@@ -50,12 +50,12 @@ mod tests {
     #[test]
     fn each_period_is_met_once() {
         let schedule = Schedule::Every(1e-6);
-        let due: Vec<u64> = (0..=100).filter(|&step| schedule.is_due(&Clock { step, dt: 1e-7 })).collect();
+        let due: Vec<u64> = (0..=100).filter(|&step| schedule.is_due(&Clock::at(step, 1e-7))).collect();
         assert_eq!(due, (0..=10).map(|k| 10 * k).collect::<Vec<_>>());
-        let due = (0..=100).filter(|&step| schedule.is_due(&Clock { step, dt: 0.7e-7 })).count();
+        let due = (0..=100).filter(|&step| schedule.is_due(&Clock::at(step, 0.7e-7))).count();
         assert_eq!(due, 1 + 7);
         let at = Schedule::At(vec![0.0, 3.5e-7]);
-        let due: Vec<u64> = (0..10).filter(|&step| at.is_due(&Clock { step, dt: 1e-7 })).collect();
+        let due: Vec<u64> = (0..10).filter(|&step| at.is_due(&Clock::at(step, 1e-7))).collect();
         assert_eq!(due, [0, 4]);
     }
 }

@@ -4,15 +4,37 @@
 use std::sync::Arc;
 
 use super::source::{Points, Source};
-use crate::field::{Field, Values};
+use crate::field::{Field, Values, difference, norm};
 use crate::solver::Clock;
 
 /// The fields that a writer wants to be handed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Wants {
     pub fields: Vec<&'static str>,
-    /// At this point only; everywhere if None.
-    pub point: Option<usize>,
+    /// At the point nearest to this place (m) only; everywhere if None.
+    pub at: Option<[f64; 3]>,
+    /// That point.
+    point: Option<usize>,
+}
+
+impl Wants {
+    /// These fields at all points.
+    pub fn everywhere(fields: Vec<&'static str>) -> Self {
+        Wants { fields, at: None, point: None }
+    }
+
+    /// These fields at the point nearest to a place, m.
+    pub fn at(fields: Vec<&'static str>, at: [f64; 3]) -> Self {
+        Wants { fields, at: Some(at), point: None }
+    }
+
+    /// Finds the place among the points of a body.
+    pub fn find(&mut self, positions: &[[f64; 3]]) {
+        self.point = self.at.and_then(|at| {
+            let far = |k: &usize| norm(&difference(&positions[*k], &at));
+            (0..positions.len()).min_by(|a, b| far(a).total_cmp(&far(b)))
+        });
+    }
 }
 
 /// What one writer sees of one instant.
@@ -66,9 +88,10 @@ impl<'a> Look<'a> {
 
     /// What a writer wants of this instant.
     pub fn snapshot(&mut self, wants: &Wants) -> Snapshot {
-        let fields = match wants.point {
-            None => wants.fields.iter().filter_map(|name| self.field(name)).collect(),
-            Some(point) => wants.fields.iter().filter_map(|name| self.field_at(name, point)).collect(),
+        let fields = match (wants.at, wants.point) {
+            (None, _) => wants.fields.iter().filter_map(|name| self.field(name)).collect(),
+            (_, None) => Vec::new(),
+            (_, Some(point)) => wants.fields.iter().filter_map(|name| self.field_at(name, point)).collect(),
         };
         Snapshot { clock: self.clock, points: self.source.points().clone(), fields }
     }

@@ -5,17 +5,18 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::field::{Field, Values};
-use crate::problem::Balance;
+use crate::physics::elasticity::surface::SurfaceEffect;
+use crate::problem::{Adapted, Balance};
 
 /// A model that outputs look at. Asking for a field may compute it, hence the `&mut`.
 pub trait Source {
-    /// What does not change, shared with whoever looks at it later.
+    /// The points as they are now, shared with whoever looks at them later.
     fn points(&self) -> &Arc<Points>;
     /// Reference positions in point order, m; zeros beyond the dimension.
     fn positions(&self) -> &[[f64; 3]] {
         &self.points().positions
     }
-    /// Facts that do not change.
+    /// Facts that change with the points only.
     fn facts(&self) -> &Facts;
     /// A field by name, in point order; None if the model has no such field.
     fn field(&mut self, name: &str) -> Option<Field>;
@@ -25,6 +26,10 @@ pub trait Source {
     fn broken_pairs(&self) -> u64;
     /// Name and value (N) of the reaction of each prescribed set.
     fn reactions(&self) -> Vec<(String, f64)>;
+    /// What refinement has done; None where cells do not follow the solution.
+    fn adapted(&self) -> Option<Adapted> {
+        None
+    }
     fn hash(&self) -> String;
     /// Bonds of each point that hold now, in point order.
     fn family_sizes(&self) -> Vec<u32>;
@@ -38,7 +43,7 @@ pub trait Source {
 
 pub use super::picture::Sizes;
 
-/// The points of a body. They never move, so that snapshots share them instead of copying.
+/// The points of a body. They stay until refinement replaces them, so that snapshots share them instead of copying.
 #[derive(Debug)]
 pub struct Points {
     /// Reference positions in point order, m; zeros beyond the dimension.
@@ -76,6 +81,8 @@ pub struct Facts {
     /// Micromodulus and smallest critical stretch.
     pub micromodulus: f64,
     pub critical_stretch: Option<f64>,
+    /// How incomplete families are at the start, corrected if asked.
+    pub surface: SurfaceEffect,
     /// Bytes that fields and bonds take.
     pub memory: u64,
 }

@@ -147,6 +147,7 @@ mod tests {
     use crate::output::files::tests::folder;
     use crate::output::snapshot::Wants;
     use crate::output::source::{Facts, Points};
+    use crate::physics::elasticity::surface::SurfaceEffect;
     use crate::solver::Clock;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
@@ -185,11 +186,12 @@ mod tests {
             rayleigh_speed: None,
             micromodulus: 1.0,
             critical_stretch: None,
+            surface: SurfaceEffect::default(),
             memory: 0,
         };
         let points = Arc::new(Points { positions: Vec::new(), sizes: Vec::new(), facts });
         let fields = vec![Arc::new(Field { name: "damage", unit: "", values: Values::Scalar(vec![0.0; numbers]) })];
-        Snapshot { clock: Clock { step, dt: 1.0 }, points, fields }
+        Snapshot { clock: Clock::at(step, 1.0), points, fields }
     }
 
     fn heavy(step: u64) -> Batch {

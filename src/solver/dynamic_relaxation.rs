@@ -31,7 +31,7 @@ impl DynamicRelaxation {
         &self,
         system: &mut (impl Equilibrium + ?Sized),
         t: f64,
-        mut observe: impl FnMut(usize, f64) -> bool,
+        observe: &mut dyn FnMut(usize, f64) -> bool,
     ) -> Result<Rested, Unrest> {
         let n = system.size();
         let way = system.pose(t);
@@ -52,9 +52,13 @@ impl DynamicRelaxation {
             }
             let relative = if size == 0.0 { 0.0 } else { size / scale };
             rested.history.push(relative);
-            if relative <= self.tolerance || !observe(iteration, relative) {
+            if relative <= self.tolerance {
                 return Ok(rested);
             }
+            if !observe(iteration, relative) {
+                return Err(Unrest::Interrupted);
+            }
+            rested.iterations += 1;
             let damping = if iteration == 0 { 0.0 } else { damping(&mass, &r, &before, &velocity, &moved) };
             let (keep, push) = ((2.0 - damping) / (2.0 + damping), 2.0 / (2.0 + damping));
             // The first half step starts from rest.

@@ -1,11 +1,9 @@
-//! Bodies at rest: Newton's method, conjugate gradients inside, a search along each step.
+//! Bodies at rest: Newton's method, a linear solver inside, a search along each step.
 //!
 //! A solver sees flat vectors, the imbalance of their forces and its tangent; never a point, a bond or a material.
 
-use super::linear::{
-    Jacobi, LinearError, LinearOperator, NullSpace, Preconditioner, Projected, Solved, Stop, conjugate_gradients,
-    vector,
-};
+use super::linear::{Cause, LinearError, NullSpace, Preconditioner, Sparse, vector};
+use super::linear_solver::LinearSolver;
 
 /// What a static solver brings to rest.
 pub trait Equilibrium {
@@ -23,6 +21,13 @@ pub trait Equilibrium {
     fn tangent(&mut self, x: &[f64], y: &mut [f64]);
     /// The diagonal of the tangent, N/m; positive, 1 where an unknown is not free.
     fn diagonal(&mut self) -> Vec<f64>;
+    /// The inverse of the block of each point on the diagonal of the tangent, at rest; 1 where an unknown is not free.
+    ///
+    /// # Errors
+    /// A block that has no inverse.
+    fn block_diagonal(&mut self) -> Result<Box<dyn Preconditioner>, LinearError>;
+    /// The tangent as a matrix, N/m: rows and columns of free unknowns, and 1 on the diagonal of the others.
+    fn assemble(&mut self) -> Sparse;
     /// The rigid motions that nothing holds.
     fn floating(&self) -> NullSpace;
     /// Whether the tangent is the same at all displacements.
@@ -36,8 +41,7 @@ pub struct Newton {
     pub tolerance: f64,
     /// Of Newton's method.
     pub max_iterations: usize,
-    /// Of conjugate gradients, in each of these.
-    pub max_linear: usize,
+    pub linear: LinearSolver,
 }
 
 /// How a body came to rest.
@@ -45,7 +49,9 @@ pub struct Newton {
 pub struct Rested {
     /// |r| over what it is measured against, before each iteration and at the end.
     pub history: Vec<f64>,
-    /// Iterations of conjugate gradients, all together.
+    /// Iterations of Newton's method, or of dynamic relaxation.
+    pub iterations: usize,
+    /// Iterations of the linear solver, all together.
     pub linear: usize,
 }
 
@@ -65,31 +71,49 @@ pub enum Unrest {
     Search(f64),
     #[error("forces are not finite numbers")]
     NotFinite,
+    #[error("interrupted")]
+    Interrupted,
     #[error("{0}")]
-    Linear(#[from] LinearError),
+    Linear(LinearError),
+}
+
+impl From<LinearError> for Unrest {
+    fn from(error: LinearError) -> Self {
+        match error {
+            LinearError::Stopped { cause: Cause::Interrupted, .. } => Unrest::Interrupted,
+            other => Unrest::Linear(other),
+        }
+    }
 }
 
 impl Unrest {
+    /// Whether smaller load steps cannot help. Loads that nothing balances are found before the first step, where
+    /// they are compared with rigid motions alone: they are the same at the end of the load step on whatever way it is
+    /// reached, and bonds that break on it only free more motions.
+    pub fn stays(&self) -> bool {
+        matches!(self, Unrest::Unbalanced(_) | Unrest::Interrupted)
+    }
+
     /// What was left of the loads, as far as it is known.
     pub fn imbalance(&self) -> f64 {
         match self {
             Unrest::Unbalanced(share) => *share,
             Unrest::Iterations { residual, .. } | Unrest::Search(residual) => *residual,
             Unrest::Linear(LinearError::Stopped { residual, .. }) => *residual,
-            Unrest::NotFinite | Unrest::Linear(_) => f64::NAN,
+            Unrest::NotFinite | Unrest::Interrupted | Unrest::Linear(_) => f64::NAN,
         }
     }
 }
 
 /// Share of the loads that may be balanced by nothing: rounding of sums over a body leaves less.
 pub(super) const UNBALANCED: f64 = 1e-8;
-/// Conjugate gradients first ask for this share of the imbalance, then for less as Newton's method closes in.
+/// What the linear solver may leave of the imbalance at first; less as Newton's method closes in.
 const FORCING: f64 = 0.1;
 const HALVINGS: usize = 12;
 
 impl Newton {
-    /// Brings `system` to rest at time `t`. `observe` is told the iterations of conjugate gradients and the relative
-    /// imbalance, and stops the solver by answering false.
+    /// Brings `system` to rest at time `t`. `observe` is told the iterations of the linear solver and the relative
+    /// imbalance, and stops the method by answering false.
     ///
     /// The first step carries the prescribed displacements into the body by the tangent; each step is halved until the
     /// imbalance falls. The linear systems are solved as tightly as they need be (Eisenstat & Walker 1996, choice 2).
@@ -100,14 +124,14 @@ impl Newton {
         &self,
         system: &mut (impl Equilibrium + ?Sized),
         t: f64,
-        mut observe: impl FnMut(usize, f64) -> bool,
+        observe: &mut dyn FnMut(usize, f64) -> bool,
     ) -> Result<Rested, Unrest> {
         let n = system.size();
         let (mut r, mut step, mut rested) = (vec![0.0; n], vec![0.0; n], Rested::default());
         let mut way = Some(system.pose(t)).filter(|way| way.iter().any(|w| *w != 0.0));
         let mut scale = system.imbalance(&mut r);
         let space = system.floating();
-        let mut diagonal = Jacobi::new(&system.diagonal())?;
+        let mut prepared = None;
         let mut last: Option<f64> = None;
         loop {
             if let Some(way) = &way {
@@ -139,11 +163,13 @@ impl Newton {
                 Some(last) => (0.9 * f64::powi(size / last, 2)).clamp(enough, FORCING),
             };
             last = Some(size);
-            step.fill(0.0);
-            let stop = Stop { tolerance, max_iterations: self.max_linear };
             let done = rested.linear;
-            let told = |k, residual: f64| observe(done + k, residual * size / scale);
-            rested.linear += solve_linear(system, &mut diagonal, &space, &r, &mut step, &stop, told)?.iterations;
+            let mut told = |k, residual: f64| observe(done + k, residual * size / known);
+            let mut ready = self.linear.prepare(system, &space, prepared.take())?;
+            let solved = self.linear.solve(system, &mut ready, &space, &r, &mut step, tolerance, &mut told)?;
+            prepared = Some(ready);
+            rested.linear += solved.iterations;
+            rested.iterations += 1;
             if let Some(way) = way.take() {
                 vector::add(1.0, &way, &mut step);
                 vector::add(1.0, &step, system.displacement());
@@ -171,40 +197,4 @@ impl Newton {
 fn space_free_norm(space: &NullSpace, r: &mut [f64]) -> f64 {
     space.balance(r);
     vector::norm(r)
-}
-
-fn solve_linear(
-    system: &mut (impl Equilibrium + ?Sized),
-    diagonal: &mut Jacobi,
-    space: &NullSpace,
-    r: &[f64],
-    step: &mut [f64],
-    stop: &Stop,
-    observe: impl FnMut(usize, f64) -> bool,
-) -> Result<Solved, LinearError> {
-    let mut tangent = Tangent(system);
-    if space.basis().is_empty() {
-        return conjugate_gradients(&mut tangent, diagonal, r, step, stop, observe);
-    }
-    let (mut tangent, mut diagonal) = (Projected::new(tangent, space), Projected::new(ByRef(diagonal), space));
-    conjugate_gradients(&mut tangent, &mut diagonal, r, step, stop, observe)
-}
-
-struct Tangent<'a, S: ?Sized>(&'a mut S);
-
-impl<S: Equilibrium + ?Sized> LinearOperator for Tangent<'_, S> {
-    fn size(&self) -> usize {
-        self.0.size()
-    }
-    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        self.0.tangent(x, y);
-    }
-}
-
-struct ByRef<'a, M>(&'a mut M);
-
-impl<M: Preconditioner> Preconditioner for ByRef<'_, M> {
-    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        self.0.apply(r, z);
-    }
 }

@@ -1,7 +1,9 @@
 //! How a body comes to rest, load step by load step: by which method, and whether bonds break.
 
+use serde::Serialize;
+
 use super::dynamic_relaxation::DynamicRelaxation;
-use super::newton::{Equilibrium, Newton, Rested, Unrest};
+use super::newton::{Equilibrium, Newton, Unrest};
 
 /// A static solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,12 +21,65 @@ pub enum Method {
     DynamicRelaxation(DynamicRelaxation),
 }
 
+/// What a load step took; the same in `report.json`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct LoadStep {
+    pub step: u64,
+    /// At rest at this time, s.
+    pub time: f64,
+    /// Iterations of Newton's method, or of dynamic relaxation, in all equilibria of the load step.
+    pub iterations: usize,
+    /// Iterations of the linear solver.
+    pub linear_iterations: usize,
+    /// How often it was taken back and divided.
+    pub halvings: usize,
+    /// |r| over loads or reactions at the end.
+    pub imbalance: f64,
+    /// The same before each iteration on the way to the last equilibrium; of long ways every so many only.
+    pub history: Vec<f64>,
+}
+
+/// Numbers of a history that are kept.
+const KEPT: usize = 100;
+
 impl Statics {
-    /// Brings `system` to rest at time `t`.
-    pub fn solve(&self, system: &mut (impl Equilibrium + ?Sized), t: f64) -> Result<Rested, Unrest> {
-        match &self.method {
-            Method::Newton(newton) => newton.solve(system, t, |_, _| true),
-            Method::DynamicRelaxation(relaxation) => relaxation.solve(system, t, |_, _| true),
+    /// Brings `system` to rest at time `t`, and adds to `log` what it took. `observe` is told the iterations of the
+    /// linear solver, or of dynamic relaxation, since the load step began, and the relative imbalance; it stops the method by
+    /// answering false.
+    ///
+    /// # Errors
+    /// [`Unrest`]; the displacements are then those of the last step.
+    pub fn solve(
+        &self,
+        system: &mut (impl Equilibrium + ?Sized),
+        t: f64,
+        log: &mut LoadStep,
+        observe: &mut dyn FnMut(usize, f64) -> bool,
+    ) -> Result<(), Unrest> {
+        let linear = matches!(self.method, Method::Newton(_));
+        let before = if linear { log.linear_iterations } else { log.iterations };
+        let mut seen = 0;
+        let mut told = |k, imbalance| {
+            seen = k;
+            observe(before + k, imbalance)
+        };
+        let rested = match &self.method {
+            Method::Newton(newton) => newton.solve(system, t, &mut told),
+            Method::DynamicRelaxation(relaxation) => relaxation.solve(system, t, &mut told),
+        };
+        match rested {
+            Ok(rested) => {
+                log.iterations += rested.iterations;
+                log.linear_iterations += rested.linear;
+                log.imbalance = rested.history.last().copied().unwrap_or(0.0);
+                let every = rested.history.len().div_ceil(KEPT).max(1);
+                log.history = rested.history.into_iter().step_by(every).collect();
+                Ok(())
+            }
+            Err(unrest) => {
+                *(if linear { &mut log.linear_iterations } else { &mut log.iterations }) += seen;
+                Err(unrest)
+            }
         }
     }
 }

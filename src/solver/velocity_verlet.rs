@@ -9,7 +9,7 @@ use super::{Clock, Stage, System, Unknowns};
 use crate::field::Number;
 
 /// Numbers that a thread updates at a time.
-const CHUNK: usize = 16 * 1024;
+pub(super) const CHUNK: usize = 16 * 1024;
 
 /// Velocity Verlet with optional damping proportional to mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,12 +59,12 @@ fn kick<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, after: f64) {
 }
 
 /// The velocity that takes 10⁵ steps over a negligible displacement.
-fn slow(negligible: f64, dt: f64) -> f64 {
+pub(super) fn slow(negligible: f64, dt: f64) -> f64 {
     1e-5 * negligible / dt
 }
 
 #[inline(always)]
-fn unless_below<T: Number>(limit: T, x: T) -> T {
+pub(super) fn unless_below<T: Number>(limit: T, x: T) -> T {
     if x < limit && limit + x > T::default() { T::default() } else { x }
 }
 
@@ -98,7 +98,7 @@ mod tests {
 
     fn error_at_one(damping: f64, n: u64) -> f64 {
         let mut system = Oscillator([1.0, 0.0, -1.0]);
-        let mut clock = Clock { step: 0, dt: 1.0 / n as f64 };
+        let mut clock = Clock::new(1.0 / n as f64);
         for _ in 0..n {
             VelocityVerlet { damping }.step(&mut system, &mut clock);
         }

@@ -91,7 +91,7 @@ fn lattice_moduli<const D: usize>(
 }
 
 /// Points of the unit lattice with β > 0 about a source at the origin, as (ξ, β).
-fn lattice_points<const D: usize>(rule: PartialVolume, m: f64) -> impl Iterator<Item = ([f64; D], f64)> {
+pub(super) fn lattice_points<const D: usize>(rule: PartialVolume, m: f64) -> impl Iterator<Item = ([f64; D], f64)> {
     let range = rule.reach::<D>(1.0, m).ceil() as i64;
     let side = 2 * range + 1;
     (0..side.pow(D as u32)).filter_map(move |index| {

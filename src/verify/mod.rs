@@ -5,6 +5,7 @@
 
 pub mod bar;
 mod constants;
+mod convergence;
 mod crack_branching;
 pub mod discrete;
 mod discrete_moduli;
@@ -17,7 +18,10 @@ mod fracture_work;
 mod kirsch;
 mod navier;
 mod precision;
+mod refined_branching;
+mod surface_effect;
 mod wave;
+mod wave_interface;
 
 use serde::Serialize;
 
@@ -83,6 +87,10 @@ pub const STUDIES: &[Study] = &[
     precision::PRECISION,
     double_cantilever::STUDY,
     kirsch::STUDY,
+    convergence::STUDY,
+    wave_interface::STUDY,
+    refined_branching::STUDY,
+    surface_effect::STUDY,
     bar::SEVEN_NODES,
     bar::CONVERGENCE,
     bar::TABLE_1,
@@ -110,6 +118,8 @@ pub struct Outcome {
     pub rows: Vec<Row>,
     /// File name without extension, and the picture.
     pub plots: Vec<(String, Image)>,
+    /// File name without extension, and the pictures that it plays.
+    pub animations: Vec<(String, Vec<Image>)>,
     /// Remarks for the reader: what a figure means, what cannot be reproduced and why.
     pub notes: Vec<String>,
 }

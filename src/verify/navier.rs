@@ -88,7 +88,7 @@ fn navier<const D: usize>(hypothesis: Hypothesis, Entry { i, a, b, j }: Entry) -
 /// The same entry from the program's linear law, integrated over the ball.
 fn integrated<const D: usize>(hypothesis: Hypothesis, influence: &Influence, entry: Entry) -> f64 {
     let c = micromodulus(hypothesis, influence, YOUNG, HORIZON);
-    let directions = directions::<D>();
+    let directions = directions::<D>(12);
     let mut sum = 0.0;
     // The integrand is ω times a polynomial; the Gaussian needs the most points.
     for (t, radial) in gauss_legendre(24) {
@@ -107,22 +107,20 @@ fn integrated<const D: usize>(hypothesis: Hypothesis, influence: &Influence, ent
     sum / YOUNG
 }
 
-/// Directions and weights of a rule on the unit sphere that is exact for the fourth powers here.
-fn directions<const D: usize>() -> Vec<([f64; D], f64)> {
-    const AROUND: usize = 12;
-    let circle = (0..AROUND).map(|k| 2.0 * PI * (k as f64 + 0.5) / AROUND as f64);
+/// Directions and weights of a rule on the unit sphere that is exact for powers below `around`, even.
+pub(super) fn directions<const D: usize>(around: usize) -> Vec<([f64; D], f64)> {
+    let circle = (0..around).map(|k| 2.0 * PI * (k as f64 + 0.5) / around as f64);
     let vector = |x: [f64; 3]| std::array::from_fn(|d| x[d]);
     match D {
         1 => vec![(vector([1.0, 0.0, 0.0]), 1.0), (vector([-1.0, 0.0, 0.0]), 1.0)],
-        2 => circle.map(|a| (vector([a.cos(), a.sin(), 0.0]), 2.0 * PI / AROUND as f64)).collect(),
-        _ => gauss_legendre(8)
+        2 => circle.map(|a| (vector([a.cos(), a.sin(), 0.0]), 2.0 * PI / around as f64)).collect(),
+        _ => gauss_legendre(around / 2)
             .into_iter()
             .flat_map(|(s, weight)| {
                 let z = 2.0 * s - 1.0;
                 let rho = (1.0 - z * z).sqrt();
-                let around = circle.clone();
-                around
-                    .map(move |a| (vector([rho * a.cos(), rho * a.sin(), z]), 2.0 * weight * 2.0 * PI / AROUND as f64))
+                let ring = circle.clone();
+                ring.map(move |a| (vector([rho * a.cos(), rho * a.sin(), z]), 2.0 * weight * 2.0 * PI / around as f64))
             })
             .collect(),
     }

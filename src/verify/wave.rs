@@ -135,7 +135,7 @@ fn wave_in_bar(full: bool) -> Result<Outcome> {
          pulse has run twice as far."
             .to_string(),
     ];
-    Ok(Outcome { rows, plots, notes })
+    Ok(Outcome { rows, plots, notes, ..Outcome::default() })
 }
 
 fn run(cells: u32) -> Result<Run> {

@@ -5,6 +5,7 @@
 //! plane stress, 1/4 in plane strain and in 3D.
 
 use crate::family::{Bond, BondLaw};
+use crate::field::dot;
 use crate::lane::{Lane, polynomial};
 
 /// Large displacements: f = ω c s (ξ + η)/|ξ + η|, s = (|ξ + η| − |ξ|)/|ξ|; eqs. (11), (15).
@@ -62,6 +63,19 @@ impl<const D: usize> BondLaw<D> for BondBased {
     #[inline(always)]
     fn tangent<L: Lane>(&self, length: L, weight: L) -> L {
         weight / length
+    }
+
+    /// Of f = weight (1 − |ξ|/|y|) y/|ξ|, y = ξ + η: weight/|ξ| [e eᵀ + (1 − |ξ|/|y|) (1 − e eᵀ)], e = y/|y|.
+    fn stiffness(&self, bond: &Bond<D, f64>, eta: &[f64; D]) -> [[f64; D]; D] {
+        let y: [f64; D] = std::array::from_fn(|d| bond.xi[d] + eta[d]);
+        let (strain, square) = (self.strain(bond, eta), dot(&y, &y));
+        let across = strain / (1.0 + strain + (1.0 + strain).sqrt());
+        std::array::from_fn(|c| {
+            std::array::from_fn(|d| {
+                let along = y[c] * y[d] / square;
+                bond.spring * (along + across * (f64::from(u8::from(c == d)) - along))
+            })
+        })
     }
 }
 
@@ -124,6 +138,12 @@ impl<const D: usize> BondLaw<D> for BondBasedLinear {
     #[inline(always)]
     fn tangent<L: Lane>(&self, length: L, weight: L) -> L {
         weight / length
+    }
+
+    /// weight/|ξ| e eᵀ, e = ξ/|ξ|.
+    fn stiffness(&self, bond: &Bond<D, f64>, _eta: &[f64; D]) -> [[f64; D]; D] {
+        let spring = bond.spring * bond.inverse_square;
+        std::array::from_fn(|c| std::array::from_fn(|d| spring * bond.xi[c] * bond.xi[d]))
     }
 }
 

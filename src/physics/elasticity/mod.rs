@@ -4,9 +4,10 @@
 
 pub mod bond_based;
 pub mod moduli;
+pub mod surface;
 
 use crate::discretization::{BondWeights, Operator};
-use crate::execution::{BreakRule, Broken, Exec, Packs};
+use crate::execution::{BlockRow, BreakRule, Broken, Exec, Packs};
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
 use crate::field::{Double, Number, Precision, components, components_mut, dot};
 use crate::lane::Lane;
@@ -114,6 +115,36 @@ impl<L> Elasticity<L> {
     {
         let (weights, kernel) = (&self.operator.weights, Diagonal(self.law));
         exec.sum_bonds::<D, 0, D, Double>(body, weights, states, [], diagonal, &kernel);
+    }
+
+    /// Row `row` of the block of each point on the diagonal of −∂force/∂u at rest: Σ e_row e_d k β V′ over whole bonds,
+    /// N/m⁴ in 3D.
+    pub fn diagonal_row<const D: usize>(
+        &self,
+        row: usize,
+        body: &Body<D>,
+        exec: &mut Exec,
+        states: &BondStates,
+        sums: [&mut [f64]; D],
+    ) where
+        L: BondLaw<D>,
+    {
+        let (weights, kernel) = (&self.operator.weights, DiagonalRow(self.law, row));
+        exec.sum_bonds::<D, 0, D, Double>(body, weights, states, [], sums, &kernel);
+    }
+
+    /// ∂f/∂η of every whole bond at these displacements (m), weighted, by the slot of x.
+    pub fn stiffness<const D: usize>(
+        &self,
+        body: &Body<D>,
+        states: &BondStates,
+        displacement: [&[f64]; D],
+    ) -> Vec<BlockRow<D>>
+    where
+        L: BondLaw<D>,
+    {
+        let law = self.law;
+        Exec::blocks(body, &self.operator.weights, states, displacement, |bond, eta| law.stiffness(bond, eta))
     }
 
     /// Strain energy density at each slot, W = ½ Σ w β V′ (J/m³); eq. (9).
@@ -239,6 +270,26 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for Diagonal<B> {
         let spring = self.0.tangent(bond.length, bond.weight) * bond.inverse_square;
         for d in 0..D {
             sum[d] = (bond.xi[d] * bond.xi[d]).mul_add(spring, sum[d]);
+        }
+        sum
+    }
+}
+
+/// One row of Σ k e eᵀ at rest.
+struct DiagonalRow<L>(L, usize);
+
+impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for DiagonalRow<B> {
+    const RELATIVE: bool = false;
+
+    #[inline(always)]
+    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
+        L::splat(0.0)
+    }
+    #[inline(always)]
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; D]) -> [L; D] {
+        let spring = self.0.tangent(bond.length, bond.weight) * bond.inverse_square * bond.xi[self.1];
+        for d in 0..D {
+            sum[d] = bond.xi[d].mul_add(spring, sum[d]);
         }
         sum
     }

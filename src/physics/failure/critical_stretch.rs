@@ -14,6 +14,8 @@ pub struct CriticalStretch {
     /// s₀ of a bond between two classes, row by row; infinite where bonds never break.
     table: Vec<f64>,
     smallest: f64,
+    /// √(δ₀/δ) of each slot; empty when horizons are alike.
+    scales: Vec<f64>,
 }
 
 /// A critical stretch for the bonds between two sets, or within one when both names are the same.
@@ -27,7 +29,13 @@ pub struct PairRule {
 impl CriticalStretch {
     /// The same s₀ for every bond.
     pub fn uniform(stretch: f64) -> Self {
-        CriticalStretch { classes: Vec::new(), n_classes: 1, table: vec![stretch], smallest: stretch }
+        CriticalStretch {
+            classes: Vec::new(),
+            n_classes: 1,
+            table: vec![stretch],
+            smallest: stretch,
+            scales: Vec::new(),
+        }
     }
 
     /// `stretch` everywhere, except where a rule speaks (a later rule wins), and no failure at the points of `no_fail`.
@@ -80,7 +88,27 @@ impl CriticalStretch {
             }
         }
         let smallest = table.iter().copied().fold(f64::INFINITY, f64::min);
-        Ok(CriticalStretch { classes, n_classes: combinations.len(), table, smallest })
+        Ok(CriticalStretch { classes, n_classes: combinations.len(), table, smallest, scales: Vec::new() })
+    }
+
+    /// The same fracture energy where horizons differ: s₀ goes with 1/√δ, and a bond takes the mean of its ends. `horizons`
+    /// by slot; `horizon`: that for which s₀ was given.
+    pub fn scaled(mut self, horizons: &[f64], horizon: f64) -> Self {
+        self.scales = horizons.iter().map(|delta| (horizon / delta).sqrt()).collect();
+        let least = self.scales.iter().copied().fold(f64::INFINITY, f64::min);
+        self.smallest = self.table.iter().copied().fold(f64::INFINITY, f64::min) * least;
+        self
+    }
+
+    /// The rule for other points, each of the class of one before: `from` by slot.
+    pub fn inherited(&self, from: impl Iterator<Item = usize>) -> Self {
+        let classes = if self.classes.is_empty() { Vec::new() } else { from.map(|old| self.classes[old]).collect() };
+        CriticalStretch { classes, scales: Vec::new(), ..self.clone() }
+    }
+
+    /// Which rule speaks at a slot.
+    pub fn class(&self, slot: usize) -> u8 {
+        self.classes.get(slot).copied().unwrap_or(0)
     }
 
     /// The smallest s₀ of any bond.
@@ -91,15 +119,17 @@ impl CriticalStretch {
     /// s₀ of the bond between two slots.
     #[inline]
     pub fn of(&self, here: usize, there: usize) -> f64 {
-        if self.classes.is_empty() {
-            return self.table[0];
-        }
-        self.table[self.classes[here] as usize * self.n_classes + self.classes[there] as usize]
+        let stretch = if self.classes.is_empty() {
+            self.table[0]
+        } else {
+            self.table[self.classes[here] as usize * self.n_classes + self.classes[there] as usize]
+        };
+        if self.scales.is_empty() { stretch } else { stretch * (0.5 * (self.scales[here] + self.scales[there])) }
     }
 
     /// Bytes that the classes take.
     pub fn memory(&self) -> usize {
-        self.classes.len()
+        self.classes.len() + size_of_val(&self.scales[..])
     }
 }
 

@@ -42,7 +42,7 @@ fn published(what: impl Into<String>, expected: f64, obtained: f64, origin: &str
 }
 
 /// −d log y/d log x, the line of least squares.
-fn rate(points: &[(f64, f64)]) -> f64 {
+pub(in crate::verify) fn rate(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let logs = || points.iter().map(|(x, y)| (x.ln(), y.ln()));
     let (mean_x, mean_y) = (logs().map(|p| p.0).sum::<f64>() / n, logs().map(|p| p.1).sum::<f64>() / n);

@@ -1,0 +1,170 @@
+//! What acts on the sets of a case, and what breaks.
+
+use std::sync::Arc;
+
+use super::super::model::{self, Formula, Motion};
+use super::Builder;
+use crate::conditions::load::Scale;
+use crate::conditions::profile::VARIABLES;
+use crate::conditions::{Load, Prescribed, Profile, Quantity};
+use crate::discretization::Influence;
+use crate::error::{Error, Result};
+use crate::expression::{Expression, nearest};
+use crate::field::Vector;
+use crate::geometry::{Cloud, Shape};
+use crate::physics::elasticity::moduli::{self, Hypothesis};
+use crate::physics::failure::CriticalStretch;
+use crate::physics::failure::critical_stretch::PairRule;
+
+impl<const D: usize> Builder<'_, D> {
+    pub(super) fn slots(&self, name: &str, cloud: &Cloud<D>, path: &str) -> Result<Arc<[u32]>> {
+        cloud.sets.get(name).cloned().ok_or_else(|| {
+            let names: Vec<&str> = cloud.sets.iter().map(|(n, _)| n).collect();
+            let help = nearest(name, names.iter().copied()).map_or(String::new(), |n| format!("did you mean `{n}`?"));
+            self.refuse(path, format!("no set has this name; sets: {}", names.join(", ")), &help)
+        })
+    }
+
+    pub(super) fn expression(&self, formula: &Formula) -> Result<Expression> {
+        match formula {
+            Formula::Number(x) => Ok(Expression::constant(*x)),
+            Formula::Text(text) => Expression::compile(text, &VARIABLES, &self.case.constants)
+                .map_err(|e| Error::Refused(format!("{text}: {e}"))),
+        }
+    }
+
+    /// The formula on the points of a set, refused if it has no finite value at one of them at t = 0.
+    pub(super) fn profile(
+        &self,
+        formula: &Formula,
+        cloud: &Cloud<D>,
+        slots: &Arc<[u32]>,
+        path: &str,
+    ) -> Result<Profile> {
+        let mut profile = Profile::new(self.expression(formula)?, cloud, slots);
+        let values = profile.at(0.0);
+        if values.iter().any(|v| !v.is_finite()) {
+            // The first bad point in point order, which is not the order of slots.
+            let bad = |slot: &u32| slots.binary_search(slot).ok().map(|k| values[k]).filter(|v| !v.is_finite());
+            let first = cloud.slots.iter().enumerate().find_map(|(point, slot)| Some((point, *slot, bad(slot)?)));
+            let (point, slot, value) = first.expect("a set holds slots of points");
+            let position = rounded(&cloud.position(slot as usize));
+            let message = format!("the formula is {value} at t = 0 at point {point}, position {position} m");
+            let help = "keep it finite everywhere in the set, as in `sqrt(max(x, 0))` or `if(x > 0, 1/x, 0)`";
+            return Err(self.refuse(path, message, help));
+        }
+        Ok(profile)
+    }
+
+    /// The motion of `conditions[k]`.
+    pub(super) fn prescribed(
+        &self,
+        k: usize,
+        motion: &Motion,
+        cloud: &Cloud<D>,
+        slots: Arc<[u32]>,
+    ) -> Result<Prescribed> {
+        let condition = &self.case.value.conditions[k];
+        let path = format!("conditions[{k}].prescribe.{}.value", motion_name(motion));
+        let (quantity, component, value) = match motion {
+            Motion::Displacement { component, value } => (Quantity::Displacement, *component, value),
+            Motion::Velocity { component, value } => (Quantity::Velocity, *component, value),
+        };
+        Ok(Prescribed {
+            name: format!("{}_{}", condition.on, ["x", "y", "z"][component]),
+            profile: self.profile(value, cloud, &slots, &path)?,
+            slots,
+            component,
+            quantity,
+            until: condition.until.unwrap_or(f64::INFINITY),
+            reaction: 0.0,
+            last: Vec::new(),
+            path: Vec::new(),
+            so_far: 0.0,
+        })
+    }
+
+    /// The load of `conditions[k]`.
+    pub(super) fn load(
+        &self,
+        k: usize,
+        load: &model::Load,
+        cloud: &Cloud<D>,
+        shape: Option<&Shape<D>>,
+        slots: &Arc<[u32]>,
+        loads: &mut Vec<Load>,
+    ) -> Result<()> {
+        let until = self.case.value.conditions[k].until.unwrap_or(f64::INFINITY);
+        let kind = match load {
+            model::Load::BodyForce { .. } => "body_force",
+            model::Load::Traction { .. } => "traction",
+            model::Load::Pressure { .. } => "pressure",
+        };
+        let path = format!("conditions[{k}].load.{kind}.value");
+        let mut push = |component, value: &Formula, scale| -> Result<()> {
+            let profile = self.profile(value, cloud, slots, &path)?;
+            loads.push(Load { slots: slots.clone(), component, profile, scale, until, last: None });
+            Ok(())
+        };
+        match load {
+            model::Load::BodyForce { component, value } => push(*component, value, Scale::Same(1.0)),
+            model::Load::Traction { component, value, thickness } => {
+                push(*component, value, Scale::Same(1.0 / thickness.unwrap_or(cloud.spacing)))
+            }
+            model::Load::Pressure { value, thickness } => {
+                let thickness = thickness.unwrap_or(cloud.spacing);
+                let Some(shape) = shape else { return Ok(()) };
+                let normals: Vec<Vector<D>> =
+                    slots.iter().map(|&slot| shape.normal(&cloud.position(slot as usize))).collect();
+                for d in 0..D {
+                    let scale = Scale::ByPoint(normals.iter().map(|n| -n[d] / thickness).collect());
+                    push(d, value, scale)?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    pub(super) fn failure(
+        &self,
+        cloud: &Cloud<D>,
+        hypothesis: Hypothesis,
+        influence: &Influence,
+        strength: f64,
+        horizon: f64,
+    ) -> Result<Option<CriticalStretch>> {
+        let Some(model::Failure::CriticalStretch(failure)) = &self.case.value.physics.elasticity.failure else {
+            return Ok(None);
+        };
+        let stretch = |energy: Option<f64>, stretch: Option<f64>| match energy {
+            Some(energy) => moduli::critical_stretch(hypothesis, influence, strength, energy, horizon),
+            None => stretch.unwrap_or(f64::INFINITY),
+        };
+        let rules: Vec<PairRule> = failure
+            .pairs
+            .iter()
+            .map(|pair| PairRule {
+                between: (pair.between[0].clone(), pair.between[1].clone()),
+                stretch: stretch(pair.fracture_energy, pair.stretch),
+            })
+            .collect();
+        let path = "physics.elasticity.failure.critical_stretch";
+        CriticalStretch::new(cloud, stretch(failure.fracture_energy, failure.stretch), &rules, &failure.no_fail)
+            .map(Some)
+            .map_err(|e| self.refuse(path, format!("failure rules: {e}"), ""))
+    }
+}
+
+pub(super) fn motion_name(motion: &Motion) -> &'static str {
+    match motion {
+        Motion::Displacement { .. } => "displacement",
+        Motion::Velocity { .. } => "velocity",
+    }
+}
+
+/// A position as `(-0.0095, 0.0045)`, without the digits that rounding left behind.
+pub(super) fn rounded(x: &[f64]) -> String {
+    let parts: Vec<String> =
+        x.iter().map(|x| format!("{x:.6e}").parse::<f64>().map_or(String::new(), |x| x.to_string())).collect();
+    format!("({})", parts.join(", "))
+}

@@ -1,0 +1,97 @@
+//! What is asked of a cloud now and then, bond by bond: gradients by least squares, and the largest of some value of bonds.
+//! Not for the inside of a loop over time.
+
+use rayon::prelude::*;
+
+use crate::family::{Body, Bond, BondStates, Families, GROUP};
+use crate::field::{Number, Vector, difference, dot, norm};
+
+/// ∇f at `slots` of a cloud for each of some fields: the g that minimises Σ V′ (g·ξ − Δf)²/|ξ|⁶ over the bonds that hold.
+/// Exact for linear fields. Zero where the bonds that are left do not span space. The nearest points count for nearly all,
+/// so that short waves keep their slope: a gradient over the whole family smooths them, and turns ramps into stairs.
+pub fn gradients<const D: usize, const N: usize, T: Number>(
+    body: &Body<D>,
+    states: &BondStates,
+    fields: [&[T]; N],
+    slots: &[u32],
+) -> Vec<[Vector<D>; N]> {
+    let (Families::Cloud(families), words) = (&body.families, states.words()) else {
+        unreachable!("gradients are asked for on clouds")
+    };
+    let gradient = |&slot: &u32| {
+        let slot = slot as usize;
+        let x = body.cloud.position(slot);
+        let (mut shape, mut right) = ([[0.0; D]; D], [[0.0; D]; N]);
+        for bond in families.of(slot) {
+            if words[bond / GROUP] >> (bond % GROUP) & 1 == 0 {
+                continue;
+            }
+            let there = families.neighbours[bond] as usize;
+            let xi = difference(&body.cloud.position(there), &x);
+            let weight = body.cloud.volume(there) / dot(&xi, &xi).powi(3);
+            for a in 0..D {
+                for b in 0..D {
+                    shape[a][b] += weight * xi[a] * xi[b];
+                }
+                for (right, field) in right.iter_mut().zip(&fields) {
+                    right[a] += weight * xi[a] * (field[there].to_f64() - field[slot].to_f64());
+                }
+            }
+        }
+        right.map(|right| solved(shape, right).unwrap_or([0.0; D]))
+    };
+    slots.par_iter().map(gradient).collect()
+}
+
+/// The largest `value(bond, relative values, x, x′)` of the bonds of each point that hold; zero where there is none.
+pub fn largest<const D: usize, T: Number>(
+    body: &Body<D>,
+    states: &BondStates,
+    fields: [&[T]; D],
+    value: impl Fn(&Bond<D, f64>, &Vector<D>, usize, usize) -> f64 + Sync,
+) -> Vec<f64> {
+    let (Families::Cloud(families), words) = (&body.families, states.words()) else {
+        unreachable!("single bonds are asked for on clouds")
+    };
+    let largest = |slot: usize| {
+        let (x, mut most) = (body.cloud.position(slot), 0.0f64);
+        for bond in families.of(slot) {
+            if words[bond / GROUP] >> (bond % GROUP) & 1 == 0 {
+                continue;
+            }
+            let there = families.neighbours[bond] as usize;
+            let xi = difference(&body.cloud.position(there), &x);
+            let relative = std::array::from_fn(|d| fields[d][there].to_f64() - fields[d][slot].to_f64());
+            most = most.max(value(&Bond::new(xi, norm(&xi), 1.0), &relative, slot, there));
+        }
+        most
+    };
+    (0..body.cloud.n_slots()).into_par_iter().map(largest).collect()
+}
+
+/// The smallest pivot, over the largest entry, of a shape that is told from a flat one.
+const FLAT: f64 = 1e-6;
+
+/// Solves a symmetric positive definite system by elimination; None if it is singular.
+fn solved<const D: usize>(mut a: [[f64; D]; D], mut b: Vector<D>) -> Option<Vector<D>> {
+    let largest = (0..D).map(|d| a[d][d]).fold(0.0, f64::max);
+    for k in 0..D {
+        if a[k][k].is_nan() || a[k][k] <= FLAT * largest {
+            return None;
+        }
+        for row in k + 1..D {
+            let factor = a[row][k] / a[k][k];
+            for column in k..D {
+                a[row][column] -= factor * a[k][column];
+            }
+            b[row] -= factor * b[k];
+        }
+    }
+    for k in (0..D).rev() {
+        for column in k + 1..D {
+            b[k] -= a[k][column] * b[column];
+        }
+        b[k] /= a[k][k];
+    }
+    Some(b)
+}

@@ -1,0 +1,132 @@
+//! The surface effect: how much softer a body is where families are incomplete, and what corrects it.
+//!
+//! A point near a surface lacks the bonds that would lead out of the body, and the energy that these would hold (Le &
+//! Bobaru 2018). Its energy density under unit strain, over that of a point with a complete family, says by how much.
+//! Bonds that pre-cracks cut are counted: a crack is no surface here.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::Elasticity;
+use crate::discretization::{Correction, Scaling};
+use crate::execution::Exec;
+use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates};
+use crate::field::Double;
+use crate::lane::Lane;
+
+/// How far the strain energy of points is off, under unit strain along each axis and in all directions alike.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct SurfaceEffect {
+    /// Fraction of the points that are off by more than 1 % in one of these.
+    pub points_affected: f64,
+    /// The smallest energy density over that of a complete family.
+    pub softest: f64,
+    /// 1 − energy of the body over that with complete families, at unit strain in all directions.
+    pub mean_deficit: f64,
+}
+
+/// Off by less counts as complete.
+const AFFECTED: f64 = 0.01;
+
+/// By slot: Σ k ξ_d⁴/|ξ|² along each axis and Σ k |ξ|² behind, four times the energy densities of unit strain, over the same
+/// of a complete family. Where axes are fewer than three, the others are not numbers.
+type Shares = [Vec<f64>; 4];
+
+impl<L> Elasticity<L> {
+    /// How complete the families of a body are. `scaling`: what its weights come from.
+    pub fn surface_effect<const D: usize>(&self, body: &Body<D>, scaling: &Scaling) -> SurfaceEffect
+    where
+        L: BondLaw<D>,
+    {
+        let shares = self.shares(body, scaling);
+        let cloud = &body.cloud;
+        let (mut affected, mut softest, mut energy, mut complete) = (0, f64::INFINITY, 0.0, 0.0);
+        for slot in cloud.stored(0..cloud.n_points()) {
+            let along = || shares[..D].iter().chain(&shares[3..]).map(|share| share[slot]);
+            affected += usize::from(along().any(|share| (share - 1.0).abs() > AFFECTED));
+            softest = along().fold(softest, f64::min);
+            energy += shares[3][slot] * cloud.volume(slot);
+            complete += cloud.volume(slot);
+        }
+        let points_affected = affected as f64 / cloud.n_points() as f64;
+        SurfaceEffect { points_affected, softest, mean_deficit: 1.0 - energy / complete }
+    }
+
+    /// The energy method's correction of this body.
+    pub fn correction_by_energy<const D: usize>(&self, body: &Body<D>, scaling: &Scaling) -> Correction<D>
+    where
+        L: BondLaw<D>,
+    {
+        let shares = self.shares(body, scaling);
+        let factors = |slot: usize| std::array::from_fn(|d| 1.0 / shares[d][slot]);
+        Correction::Energy((0..body.cloud.n_slots()).map(factors).collect())
+    }
+
+    /// The volume method's correction of this body, which has one horizon.
+    pub fn correction_by_volume<const D: usize>(&self, body: &Body<D>, scaling: &Scaling) -> Correction<D> {
+        let mut shares = vec![0.0; body.cloud.n_slots()];
+        self.bonded_volume(body, &mut Exec::default(), &BondStates::whole(body), &mut shares);
+        let mut complete = 0.0;
+        scaling.complete::<D>(body.cloud.spacing, body.horizon, |_, volume| complete += volume);
+        shares.iter_mut().for_each(|share| *share /= complete);
+        Correction::Volume(shares)
+    }
+
+    fn shares<const D: usize>(&self, body: &Body<D>, scaling: &Scaling) -> Shares
+    where
+        L: BondLaw<D>,
+    {
+        let mut shares: Shares = std::array::from_fn(|_| vec![0.0; body.cloud.n_slots()]);
+        let (weights, whole, kernel) = (&self.operator.weights, BondStates::whole(body), UnitStrain(self.law));
+        let output = shares.each_mut().map(|share| &mut share[..]);
+        Exec::default().sum_bonds::<D, 0, 4, Double>(body, weights, &whole, [], output, &kernel);
+        let complete = |size, horizon| {
+            let mut sum = [0.0; 4];
+            scaling.complete::<D>(size, horizon, |bond, _| sum = kernel.add(bond, &[], 0.0, sum));
+            sum
+        };
+        match &body.grading {
+            None => {
+                let complete = complete(body.cloud.spacing, body.horizon);
+                for (share, complete) in shares.iter_mut().zip(complete) {
+                    share.iter_mut().for_each(|share| *share /= complete);
+                }
+            }
+            Some(grading) => {
+                // Micromoduli scale so that the ratio δ/Δx alone matters.
+                let mut known = BTreeMap::new();
+                for (slot, (&size, &horizon)) in grading.sizes.iter().zip(&grading.horizons).enumerate() {
+                    let ratio: f64 = horizon / size;
+                    let complete = known.entry(ratio.to_bits()).or_insert_with(|| complete(size, horizon));
+                    for (share, complete) in shares.iter_mut().zip(complete) {
+                        share[slot] /= *complete;
+                    }
+                }
+            }
+        }
+        shares
+    }
+}
+
+/// Σ k ξ_d⁴/|ξ|² and Σ k |ξ|²
+struct UnitStrain<L>(L);
+
+impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 4> for UnitStrain<B> {
+    const RELATIVE: bool = false;
+
+    #[inline(always)]
+    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
+        L::splat(0.0)
+    }
+    #[inline(always)]
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; 4]) -> [L; 4] {
+        let spring = self.0.tangent(bond.length, bond.weight);
+        for d in 0..D {
+            let square = bond.xi[d] * bond.xi[d];
+            sum[d] = (square * square * bond.inverse_square).mul_add(spring, sum[d]);
+        }
+        sum[3] = (bond.length * bond.length).mul_add(spring, sum[3]);
+        sum
+    }
+}
