@@ -87,6 +87,11 @@ fn corrected_bars_are_as_long_as_they_should_be() {
 }
 
 #[test]
+fn a_bar_at_rest_by_sums_and_by_collocation_has_the_stated_errors() {
+    passes("hybrid-example-1");
+}
+
+#[test]
 fn the_seven_nodes_have_the_printed_matrix() {
     passes("bar-7-nodes");
 }

@@ -8,6 +8,7 @@
 //! | symmetric positive | [`conjugate_gradients()`]; 2D or below some 30 000 unknowns [`Direct::cholesky`] |
 //! | general | [`bicgstab()`], [`gmres()`] (safer, more memory), [`Direct::lu`] |
 //! | with rigid motions | any of the first with [`Projected`], or [`Bordered`] |
+//! | small and dense, rank to be known | [`SingularValues`] |
 
 mod bicgstab;
 mod conjugate_gradients;
@@ -17,6 +18,7 @@ mod incomplete;
 mod krylov;
 mod null_space;
 mod preconditioner;
+mod singular_values;
 mod sparse;
 pub mod vector;
 
@@ -31,6 +33,7 @@ pub use incomplete::{IncompleteCholesky, IncompleteLu};
 pub use krylov::{Solved, Stop};
 pub use null_space::{Bordered, NullSpace, Projected};
 pub use preconditioner::{BlockJacobi, Jacobi, NoPreconditioner};
+pub use singular_values::SingularValues;
 pub use sparse::Sparse;
 
 /// A square matrix, known by its product with a vector.

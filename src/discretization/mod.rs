@@ -1,5 +1,6 @@
 //! Which weights at which points: influence functions, partial volumes, schemes, surface corrections.
 
+pub mod collocation;
 pub mod graded;
 pub mod influence;
 pub mod moments;
@@ -8,6 +9,7 @@ pub mod standard;
 pub mod surface;
 pub mod volume;
 
+pub use collocation::Collocation;
 pub use graded::Scaling;
 pub use influence::Influence;
 pub use standard::{BondWeights, Operator};

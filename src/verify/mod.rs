@@ -15,6 +15,7 @@ mod energy_drift;
 pub mod exact;
 mod family_counts;
 mod fracture_work;
+mod hybrid_example_1;
 mod kirsch;
 mod navier;
 mod precision;
@@ -91,6 +92,7 @@ pub const STUDIES: &[Study] = &[
     wave_interface::STUDY,
     refined_branching::STUDY,
     surface_effect::STUDY,
+    hybrid_example_1::STUDY,
     bar::SEVEN_NODES,
     bar::CONVERGENCE,
     bar::TABLE_1,
