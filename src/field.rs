@@ -15,11 +15,25 @@ pub trait Number:
     fn to_f64(self) -> f64;
     /// Its bytes, the lowest first.
     fn bytes(self) -> impl AsRef<[u8]>;
+    /// A field as one of double precision, if it is that.
+    fn doubles(_field: &[Self]) -> Option<&[f64]> {
+        None
+    }
+    /// The same, to be written.
+    fn doubles_mut(_field: &mut [Self]) -> Option<&mut [f64]> {
+        None
+    }
     /// A fraction of a length that is nothing: far below rounding, far above the smallest numbers, which are slow.
     const NEGLIGIBLE: f64;
 }
 
 impl Number for f64 {
+    fn doubles(field: &[Self]) -> Option<&[f64]> {
+        Some(field)
+    }
+    fn doubles_mut(field: &mut [Self]) -> Option<&mut [f64]> {
+        Some(field)
+    }
     const NEGLIGIBLE: f64 = 1e-150;
     #[inline(always)]
     fn from_f64(x: f64) -> Self {

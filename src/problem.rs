@@ -4,6 +4,7 @@
 //! that a wrong run is seen at once.
 
 pub mod adapt;
+pub mod hybrid;
 mod rest;
 
 use std::ops::Range;
@@ -11,6 +12,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 pub use adapt::{Adaptation, Adapted};
+pub use hybrid::Hybrid;
 
 use crate::conditions::load::Done;
 use crate::conditions::prescribed::Step;
@@ -20,6 +22,7 @@ use crate::execution::{Exec, Packs};
 use crate::family::{Body, BondLaw, BondStates, Families};
 use crate::field::{Double, Field, Number, Precision, Values, components, components_mut, embed};
 use crate::geometry::Arrangement;
+use crate::physics::elasticity::state_based::StateBased;
 use crate::physics::elasticity::{Elasticity, State};
 use crate::physics::failure::CriticalStretch;
 use crate::solver::runge_kutta::Memory;
@@ -50,6 +53,8 @@ pub struct Problem<const D: usize, L, P: Precision = Double> {
     pub is_static: bool,
     /// How cells follow the solution; None if they do not.
     adaptation: Option<Box<Adaptation<D>>>,
+    /// Which points have rows instead of bonds; None if none has.
+    hybrid: Option<Box<Hybrid<D, P>>>,
     /// What each point belongs to: only points of one kind are merged.
     kinds: Vec<u32>,
     pub adapted: Adapted,
@@ -139,6 +144,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             load_steps: Vec::new(),
             is_static: false,
             adaptation: None,
+            hybrid: None,
             kinds: Vec::new(),
             adapted: Adapted::default(),
             generation: 0,
@@ -163,6 +169,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         self.ledger.external = 0.0;
         self.ledger.kinetic = now.kinetic;
         self.ledger.momentum = now.momentum;
+        self.book_stiffness_damping(0, 0.0, true);
     }
 
     /// Puts what is prescribed in motion at time `t` and evaluates the forces there.
@@ -244,6 +251,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             }
         }
         self.watch(solver, clock)?;
+        self.book_stiffness_damping(clock.step, clock.dt, false);
         if self.adaptation.as_ref().is_some_and(|adaptation| clock.step.is_multiple_of(adaptation.every)) {
             self.adapt(clock.time(), false);
         }
@@ -345,8 +353,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
 
     /// The energies and momenta now.
     pub fn balance(&mut self) -> Balance {
-        let mut density = vec![P::Field::default(); self.body.cloud.n_slots()];
-        self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
+        let density = self.strain_energy();
         let (cloud, rho) = (&self.body.cloud, self.physics.density);
         let v = components::<D, _>(&self.state.velocity);
         let n = cloud.n_points();
@@ -408,6 +415,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
 
     fn field_of(&mut self, name: &str, points: Range<usize>) -> Option<Field> {
         let damage = if name == "damage" { self.damage() } else { Vec::new() };
+        let density = if name == "strain_energy" { self.strain_energy() } else { Vec::new() };
         let slots = &self.body.cloud.slots[points];
         let vector = |flat: &[P::Field]| {
             let parts = components::<D, _>(flat);
@@ -419,11 +427,8 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             "velocity" => ("velocity", "m/s", vector(&self.state.velocity)),
             "force" => ("force", "N/m³", vector(&self.state.force)),
             "damage" => ("damage", "", scalar(&|slot| damage[slot])),
-            "strain_energy" => {
-                let mut density = vec![P::Field::default(); self.body.cloud.n_slots()];
-                self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
-                ("strain_energy", "J/m³", scalar(&|slot| density[slot].to_f64()))
-            }
+            "strain_energy" => ("strain_energy", "J/m³", scalar(&|slot| density[slot].to_f64())),
+            "scheme" => ("scheme", "", scalar(&|slot| self.scheme(slot))),
             _ => return None,
         };
         Some(Field { name, unit, values })
@@ -431,7 +436,8 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
 
     /// φ = 1 − Σ μ β V′ / Σ β V′ by slot; Shojaei et al. 2022, eq. (21).
     fn damage(&mut self) -> Vec<f64> {
-        let mut now = vec![0.0; self.body.cloud.n_slots()];
+        // Points with a row have lost no bond.
+        let mut now: Vec<f64> = self.family_volume.iter().map(|whole| whole.to_f64()).collect();
         self.physics.bonded_volume(&self.body, &mut self.exec, &self.state.states, &mut now);
         let damage = |(now, whole): (&f64, &P::Field)| {
             let [now, whole] = [P::Field::from_f64(*now), *whole].map(P::Field::to_f64);
@@ -459,6 +465,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         let cloud = &self.body.cloud;
         let fields = (3 * D + 1) * size_of::<P::Field>() * cloud.n_slots() + size_of_val(&cloud.slots[..]);
         let classes = self.physics.failure.as_ref().map_or(0, CriticalStretch::memory);
+        let classes = classes + self.physics.state_based.as_ref().map_or(0, StateBased::memory);
         let points = match &cloud.arrangement {
             Arrangement::Lattice(_) => 0,
             Arrangement::Scattered { positions, volumes } => size_of_val(&positions[..]) + size_of_val(&volumes[..]),
@@ -474,7 +481,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             }
         };
         let bonds = size_of_val(self.state.states.words()) + self.physics.operator.memory();
-        fields + classes + points + families + bonds
+        fields + classes + points + families + bonds + self.memory_of_hybrid()
     }
 
     /// Whether cells follow the solution.
@@ -523,7 +530,7 @@ fn squares_and_sum<T: Number>(values: &[T], volumes: Option<&[f64]>) -> [f64; 2]
 }
 
 /// The fields that [`Problem::field`] knows.
-pub const FIELDS: [&str; 5] = ["displacement", "velocity", "force", "damage", "strain_energy"];
+pub const FIELDS: [&str; 6] = ["displacement", "velocity", "force", "damage", "strain_energy", "scheme"];
 
 impl<const D: usize, L: BondLaw<D>, P: Packs> System for Problem<D, L, P> {
     type Number = P::Field;
@@ -535,6 +542,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> System for Problem<D, L, P> {
             force: &self.state.force,
             inertia: self.physics.density,
             negligible: P::Bond::NEGLIGIBLE * self.body.cloud.spacing,
+            ahead: self.hybrid.as_mut().and_then(|hybrid| hybrid.ahead()),
         }
     }
 
@@ -556,10 +564,13 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> System for Problem<D, L, P> {
                 }
             }
         }
+        if let (Stage::Drift, Some(hybrid)) = (stage, &mut self.hybrid) {
+            hybrid.drifted(&self.prescribed, &self.state);
+        }
     }
 
     fn evaluate(&mut self, t: f64, dt: f64) {
-        self.physics.evaluate(&self.body, &mut self.exec, &mut self.state, dt);
+        self.evaluate_bonds(dt);
         let done = self.load(t, dt);
         for (load, done) in self.loads.iter().zip(done) {
             self.ledger.external += done.work;
@@ -568,21 +579,20 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> System for Problem<D, L, P> {
     }
 
     fn stable_step(&self) -> f64 {
-        self.physics.stable_step(&self.body)
+        let bonds = self.physics.stable_step(&self.body);
+        self.hybrid.as_ref().map_or(bonds, |hybrid| hybrid.stable_step(self.physics.density, bonds))
     }
 }
 
 impl<const D: usize, L: BondLaw<D>, P: Packs> Staged for Problem<D, L, P> {
     fn stage(&mut self, t: f64, end: f64, dt: f64) {
-        let Problem { body, physics, state, prescribed, exec, .. } = self;
-        let State { displacement, velocity, force, states, .. } = state;
-        for p in prescribed {
+        let State { displacement, velocity, .. } = &mut self.state;
+        for p in &mut self.prescribed {
             let u = &mut *components_mut::<D, _>(displacement)[p.component];
             let v = &mut *components_mut::<D, _>(velocity)[p.component];
             p.stage(t, end, dt, u, v);
         }
-        let (input, output) = (components::<D, _>(displacement), components_mut::<D, _>(force));
-        physics.force_density::<D, P>(body, exec, states, input, output);
+        self.force_of_bonds();
         self.load(t, 0.0);
     }
 
@@ -626,7 +636,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Staged for Problem<D, L, P> {
             self.ledger.impulse[c] += done.impulse;
         }
         // A bond that breaks has acted all through the step, and takes what it holds at its end.
-        self.physics.evaluate(&self.body, &mut self.exec, &mut self.state, 0.0);
+        self.evaluate_bonds(0.0);
         self.load(t, 0.0);
     }
 }

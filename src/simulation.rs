@@ -14,11 +14,12 @@ use crate::family::BondLaw;
 use crate::field::{Double, Field, Precision, embed};
 use crate::geometry::Arrangement;
 use crate::output::history::History;
-use crate::output::report::{Energy, Refinement, Report, Tip, WallSeconds, peak_memory};
+use crate::output::report::{Energy, Hybrid, Refinement, Report, Tip, WallSeconds, peak_memory};
 use crate::output::snapshot::Look;
 use crate::output::source::{Facts, Points, Source};
 use crate::output::writer::{Order, Output};
 use crate::output::writer_thread::{Batch, WriterThread};
+use crate::problem::hybrid::Work;
 use crate::problem::{Adapted, Balance, Problem};
 use crate::solver::statics::LoadStep;
 use crate::solver::{Clock, Solver};
@@ -244,6 +245,12 @@ impl Simulation {
                 refined: b.refined,
                 initial: b.initial,
             },
+            hybrid: self.model.hybrid().map(|work| Hybrid {
+                standard_fraction_at_start: work.standard[1],
+                standard_fraction: work.standard[0],
+                bond_evaluations: work.all_bonds,
+                row_evaluations: work.all_nodes,
+            }),
             refinement: self.model.adapted().map(|adapted| Refinement {
                 events: adapted.events,
                 most_points: adapted.points[0],
@@ -380,6 +387,9 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Source for Model<D, L, P> {
     }
     fn adapted(&self) -> Option<Adapted> {
         self.problem.is_adapting().then_some(self.problem.adapted)
+    }
+    fn hybrid(&self) -> Option<Work> {
+        self.problem.hybrid()
     }
     fn hash(&self) -> String {
         self.problem.hash()

@@ -44,7 +44,7 @@ fn model<const D: usize, L: BondLaw<D>>(
     let body = standard::body(cloud, 3.0 * SPACING, rule);
     // E = 1 in units that do not matter: forces are compared with each other.
     let operator = Operator::standard(&body, 1.0, influence, rule);
-    (body, Elasticity { law, density: 1.0, operator, failure })
+    (body, Elasticity { law, density: 1.0, operator, failure, state_based: None })
 }
 
 /// A smooth field with strains up to about 2 % and a different value at every point.
@@ -68,7 +68,7 @@ fn evaluated<const D: usize, L: BondLaw<D>>(
     if let Some(crack) = crack {
         state.states.cut(body, crack, 1e-9 * SPACING);
     }
-    physics.evaluate(body, &mut Exec::default(), &mut state, 0.0);
+    physics.evaluate(body, &mut Exec::default(), &mut state, 0.0, None);
     state
 }
 

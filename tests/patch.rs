@@ -43,7 +43,7 @@ impl<const D: usize, L: BondLaw<D>> Specimen<D, L> {
         let body = standard::body(cloud, horizon, rule);
         let strength = micromodulus(hypothesis, &influence, YOUNG, horizon);
         let operator = Operator::standard(&body, strength, influence, rule);
-        let physics = Elasticity { law, density: DENSITY, operator, failure: None };
+        let physics = Elasticity { law, density: DENSITY, operator, failure: None, state_based: None };
         Specimen { label, body, physics, influence, rule, hypothesis }
     }
 
@@ -55,7 +55,7 @@ impl<const D: usize, L: BondLaw<D>> Specimen<D, L> {
     /// The state at displacements u(point, x), with its forces.
     fn displaced(&self, u: impl FnMut(usize, [f64; D]) -> [f64; D]) -> State {
         let mut state = self.placed(u);
-        self.physics.evaluate(&self.body, &mut Exec::default(), &mut state, 0.0);
+        self.physics.evaluate(&self.body, &mut Exec::default(), &mut state, 0.0, None);
         state
     }
 

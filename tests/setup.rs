@@ -46,7 +46,7 @@ fn set_up(rule: PartialVolume, mut positions: Vec<[f64; 3]>, shuffle: bool) {
     let cloud = timed("cloud", || Cloud::scattered(positions, volumes));
     let body = timed("families", || standard::body(cloud, 3.015, rule));
     let operator = timed("weights", || Operator::standard(&body, 1.0, Influence::Constant, rule));
-    let physics = Elasticity { law: BondBased, density: 1.0, operator, failure: None };
+    let physics = Elasticity { law: BondBased, density: 1.0, operator, failure: None, state_based: None };
     let mut state: State = timed("states", || physics.initial_state(&body));
     std::hint::black_box(timed("stable step", || physics.stable_step(&body)));
     let mut exec = Exec::default();
@@ -56,7 +56,7 @@ fn set_up(rule: PartialVolume, mut positions: Vec<[f64; 3]>, shuffle: bool) {
             c[slot] = 1e-3 * (0.1 * u).sin();
         }
     }
-    timed("one sum of forces", || physics.evaluate(&body, &mut exec, &mut state, 0.0));
+    timed("one sum of forces", || physics.evaluate(&body, &mut exec, &mut state, 0.0, None));
     let mut volume = vec![0.0; body.cloud.n_slots()];
     timed("one sum of volumes", || physics.bonded_volume(&body, &mut exec, &state.states, &mut volume));
     let bonds = state.states.count();

@@ -92,6 +92,21 @@ fn a_bar_at_rest_by_sums_and_by_collocation_has_the_stated_errors() {
 }
 
 #[test]
+fn diffusion_in_a_square_has_the_stated_errors_and_what_would_grow_is_refused() {
+    passes("hybrid-example-2");
+}
+
+#[test]
+fn a_crack_through_rows_and_bonds_is_that_through_bonds() {
+    passes("hybrid-branching");
+}
+
+#[test]
+fn waves_pass_from_rows_into_bonds_and_do_not_grow() {
+    passes("hybrid-wave");
+}
+
+#[test]
 fn the_seven_nodes_have_the_printed_matrix() {
     passes("bar-7-nodes");
 }

@@ -116,7 +116,7 @@ fn on_body<const D: usize, L: BondLaw<D> + 'static, P: Packs>(
     let body: Body<D> = standard::body(points, 3.015 * SPACING, PartialVolume::None);
     let operator = Operator::standard(&body, 1.0, Influence::Constant, PartialVolume::None);
     let failure = (what != What::Unbreakable).then(|| CriticalStretch::uniform(0.1));
-    let physics = Elasticity { law, density: 1.0, operator, failure };
+    let physics = Elasticity { law, density: 1.0, operator, failure, state_based: None };
     let mut state: State<P> = physics.initial_state(&body);
     // Strains up to 0.1 %, or 3 %: those of the first are below the 1 % up to which small forms serve.
     let stretch = if what == What::ExactForce { 3e-2 } else { 1e-3 };
@@ -131,7 +131,7 @@ fn on_body<const D: usize, L: BondLaw<D> + 'static, P: Packs>(
     let mut density = vec![P::Field::default(); body.cloud.n_slots()];
     let evaluate = move || match what {
         What::Energy => physics.strain_energy_density(&body, &mut exec, &state, &mut density),
-        What::Force | What::ExactForce | What::Unbreakable => physics.evaluate(&body, &mut exec, &mut state, 0.0),
+        What::Force | What::ExactForce | What::Unbreakable => physics.evaluate(&body, &mut exec, &mut state, 0.0, None),
     };
     Kernel { bonds, evaluate: Box::new(evaluate) }
 }

@@ -152,6 +152,22 @@ fn mistakes() -> Vec<Mistake> {
             "[solver.",
             "[refinement]\nlevels = 1\nzones = [{ region = { where = \"x > 0\" }, level = 3 }]\n\n[solver.",
         ),
+        patch("hybrid_of_odd_order", "influence =", "scheme = { hybrid = { order = 3 } }\ninfluence ="),
+        patch("hybrid_unknown_key", "influence =", "scheme = { hybrid = { switchat = 0.5 } }\ninfluence ="),
+        patch("hybrid_undefined_set", "influence =", "scheme = { hybrid = { standard = [\"grip\"] } }\ninfluence ="),
+        patch(
+            "hybrid_that_would_grow",
+            "horizon = \"3*h\"\n",
+            "horizon = \"4*h\"\nscheme = { hybrid = { order = 4, points = 49 } }\n",
+        ),
+        Mistake::patch(
+            "hybrid_of_scattered_points_at_rest",
+            &[
+                ("spacing = \"h\"\n", "spacing = \"h\"\nperturb = { amplitude = 0.1 }\n"),
+                ("influence =", "scheme = { hybrid = {} }\ninfluence ="),
+                (SOLVER, "[solver.quasi_static]\n"),
+            ],
+        ),
         patch(
             "refinement_at_rest",
             SOLVER,
@@ -201,6 +217,21 @@ fn mistakes() -> Vec<Mistake> {
         patch("poisson_plane_stress", "plane = \"stress\"", "plane = \"stress\", poisson = 0.3"),
         patch("poisson_plane_strain", "plane = \"stress\"", "plane = \"strain\", poisson = 0.3"),
         solid("poisson_solid", &[(YOUNG, "young = \"72 GPa\", poisson = 0.3")]),
+        patch("poisson_of_state_based", "bond_based = { young", "state_based = { poisson = 1.0, young"),
+        solid("poisson_incompressible", &[("bond_based = { young", "state_based = { poisson = 0.5, young")]),
+        patch("state_based_without_poisson", "bond_based = { young", "state_based_linear = { young"),
+        Mistake::patch(
+            "state_based_cannot",
+            &[
+                ("bond_based = { young", "state_based = { poisson = 0.3, young"),
+                (
+                    "[discretization]",
+                    "[refinement]\nlevels = 1\nzones = [{ region = { where = \"x > 0\" }, level = 1 }]\n\n\
+                     [discretization]\nprecision = \"single\"\nsurface_correction = \"energy\"",
+                ),
+                ("[solver.velocity_verlet]\nend_time = \"5 us\"\nsafety = 0.8", "[solver.newton]\nend_time = 1"),
+            ],
+        ),
         // Constants.
         patch("constants_in_a_circle", "h = \"1 mm\"", "h = \"delta/3\"\ndelta = \"3*h\""),
         patch("constant_with_a_taken_name", "h = \"1 mm\"", "h = \"1 mm\"\nt = 3"),

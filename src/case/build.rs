@@ -2,6 +2,7 @@
 
 mod conditions;
 mod geometry;
+mod hybrid;
 mod outputs;
 
 use std::collections::VecDeque;
@@ -12,7 +13,7 @@ use super::bundled;
 use super::check::check;
 use super::diagnostics::{Diagnostic, Severity};
 use super::model::{
-    self, BondBased, Case, FieldName, InfluenceFunction, Law, Motion, Output, PartialVolumes, Plane, Precision,
+    self, BondBased, Case, FieldName, InfluenceFunction, Law, Motion, Output, PartialVolumes, Plane, Precision, Scheme,
     SurfaceCorrection,
 };
 use super::read::{Located, Source};
@@ -34,6 +35,7 @@ use crate::output::writer::Output as Written;
 use crate::physics::Elasticity;
 use crate::physics::elasticity::bond_based;
 use crate::physics::elasticity::moduli::{self, Hypothesis};
+use crate::physics::elasticity::state_based::{self, StateBased};
 use crate::physics::failure::CriticalStretch;
 use crate::problem::Problem;
 use crate::simulation::{Leg, Model, Simulation, Stepper};
@@ -99,9 +101,13 @@ struct Builder<'a, const D: usize> {
 
 impl<const D: usize> Builder<'_, D> {
     fn simulation(&self) -> Result<Simulation> {
-        match &self.case.value.physics.elasticity.law {
-            Law::BondBased(p) => self.with_law(bond_based::BondBased, p),
-            Law::BondBasedLinear(p) => self.with_law(bond_based::BondBasedLinear, p),
+        let law = &self.case.value.physics.elasticity.law;
+        let parameters = law.parameters();
+        match law {
+            Law::BondBased(_) | Law::StateBased(_) => self.with_law(bond_based::BondBased, &parameters),
+            Law::BondBasedLinear(_) | Law::StateBasedLinear(_) => {
+                self.with_law(bond_based::BondBasedLinear, &parameters)
+            }
         }
     }
 
@@ -144,7 +150,16 @@ impl<const D: usize> Builder<'_, D> {
             (2, _) => Hypothesis::PlaneStress,
             _ => Hypothesis::Solid,
         };
-        let strength = moduli::micromodulus(hypothesis, &influence, parameters.young, horizon);
+        let solid = case
+            .physics
+            .elasticity
+            .law
+            .is_state_based()
+            .then(|| state_based::Moduli::new(hypothesis, parameters.young, parameters.poisson.unwrap_or(0.0)));
+        let strength = match &solid {
+            Some(solid) => solid.strength(&influence, horizon),
+            None => moduli::micromodulus(hypothesis, &influence, parameters.young, horizon),
+        };
         let tolerance = 1e-9 * cloud.spacing;
         let scaling = Scaling { strength, horizon, influence, rule };
         let adaptation = match &case.refinement {
@@ -157,7 +172,8 @@ impl<const D: usize> Builder<'_, D> {
             let lattice = standard::body(std::mem::replace(&mut cloud, adaptation.cells.cloud()), horizon, rule);
             if adaptation.criteria.is_some() {
                 let operator = Operator::standard(&lattice, strength, influence, rule);
-                let physics = Elasticity { law, density: parameters.density, operator, failure: None };
+                let physics =
+                    Elasticity { law, density: parameters.density, operator, failure: None, state_based: None };
                 finest_step = physics.stable_step(&lattice) / f64::from(1u32 << adaptation.cells.levels);
             }
         }
@@ -165,7 +181,7 @@ impl<const D: usize> Builder<'_, D> {
         if adaptation.is_none() && case.discretization.surface_correction != SurfaceCorrection::None {
             let body = standard::body(cloud, horizon, rule);
             let operator = Operator::standard(&body, strength, influence, rule);
-            let physics = Elasticity { law, density: parameters.density, operator, failure: None };
+            let physics = Elasticity { law, density: parameters.density, operator, failure: None, state_based: None };
             correction = self.correction(&physics, &body, &scaling);
             cloud = body.cloud;
             // Every bond has a weight of its own now, as on a cloud.
@@ -176,7 +192,11 @@ impl<const D: usize> Builder<'_, D> {
             }
         }
         self.sets(&mut cloud, shape.as_ref())?;
-        let mut failure = self.failure(&cloud, hypothesis, &influence, strength, horizon)?;
+        let critical = |energy| match &solid {
+            Some(solid) => solid.critical_stretch(&influence, energy, horizon),
+            None => moduli::critical_stretch(hypothesis, &influence, strength, energy, horizon),
+        };
+        let mut failure = self.failure(&cloud, &critical)?;
         let (body, operator) = match &adaptation {
             None => {
                 let body = standard::body(cloud, horizon, rule);
@@ -200,7 +220,8 @@ impl<const D: usize> Builder<'_, D> {
                     log::warn!("{}", self.source().warning("refinement.buffer", message).help(help));
                 }
                 let operator = scaling.operator(&body, &Update::default(), None, None);
-                let physics = Elasticity { law, density: parameters.density, operator, failure: None };
+                let physics =
+                    Elasticity { law, density: parameters.density, operator, failure: None, state_based: None };
                 let operator = match self.correction(&physics, &body, &scaling) {
                     None => physics.operator,
                     correction => scaling.operator(&body, &Update::default(), None, correction.as_ref()),
@@ -208,7 +229,15 @@ impl<const D: usize> Builder<'_, D> {
                 (body, operator)
             }
         };
-        let physics = Elasticity { law, density: parameters.density, operator, failure };
+        let state_based = solid.map(|solid| StateBased::new(solid, L::LINEAR, &body, &operator.weights));
+        let mut physics = Elasticity { law, density: parameters.density, operator, failure, state_based };
+        let settings = match &case.discretization.scheme {
+            Scheme::Hybrid(settings) => Some(settings),
+            Scheme::Standard => None,
+        };
+        if settings.is_some_and(|settings| settings.rescale) {
+            hybrid::rescale(&mut physics, &body, &scaling);
+        }
         let surface = physics.surface_effect(&body, &scaling);
         let mut state = physics.initial_state::<D, P>(&body);
         let mut n_cut = 0;
@@ -234,7 +263,15 @@ impl<const D: usize> Builder<'_, D> {
                 self.load(k, load, &body.cloud, shape.as_ref(), &slots, &mut loads)?;
             }
         }
-        let stable_step = physics.stable_step(&body).min(finest_step);
+        let bar_speed = (parameters.young / parameters.density).sqrt();
+        let hybrid = match settings {
+            Some(settings) => Some(self.hybrid(settings, &body, &physics, &state, &scaling, horizon / bar_speed)?),
+            None => None,
+        };
+        let mut stable_step = physics.stable_step(&body).min(finest_step);
+        if let Some(hybrid) = &hybrid {
+            stable_step = hybrid.stable_step(physics.density, stable_step);
+        }
         let smallest = physics.failure.as_ref().map(CriticalStretch::smallest).filter(|s| s.is_finite());
         let facts = Facts {
             dimension: D,
@@ -244,8 +281,11 @@ impl<const D: usize> Builder<'_, D> {
             horizon,
             spacing: 0.0,
             stable_step,
-            bar_speed: (parameters.young / parameters.density).sqrt(),
-            rayleigh_speed: moduli::rayleigh_speed(hypothesis, parameters.young, parameters.density),
+            bar_speed,
+            rayleigh_speed: match &solid {
+                Some(solid) => solid.rayleigh_speed(parameters.density),
+                None => moduli::rayleigh_speed(hypothesis, parameters.young, parameters.density),
+            },
             micromodulus: strength,
             critical_stretch: smallest,
             surface,
@@ -254,6 +294,9 @@ impl<const D: usize> Builder<'_, D> {
         let mut problem = Problem::new(body, physics, state, prescribed, loads, n_cut);
         if let Some(adaptation) = adaptation {
             problem.adapting(adaptation);
+        }
+        if let Some(hybrid) = hybrid {
+            problem.hybridise(hybrid);
         }
         problem.is_static = self.case.value.solver.stages().next().is_some_and(|(_, first)| !moves(first));
         let model = Model::new(problem, facts);

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::diagnostics::Diagnostic;
 use super::model::{
-    BondBased, Case, Crack, CriticalStretch, FailurePair, Law, LinearSolver, Load, Motion, Output, Plane, Region,
-    Shape, Solver, SurfaceCorrection,
+    Case, Crack, CriticalStretch, FailurePair, Hybrid, Law, LinearSolver, Load, Motion, Output, Plane, Precision,
+    Region, Scheme, Shape, Solver, SurfaceCorrection,
 };
 use super::read::{Located, Source};
 use crate::expression::nearest;
@@ -60,14 +60,21 @@ impl Checker<'_> {
         self.discretization(case);
         self.refinement(case);
         self.correction(case);
-        let elasticity = &case.physics.elasticity;
-        let (law, parameters) = match &elasticity.law {
-            Law::BondBased(p) => ("bond_based", p),
-            Law::BondBasedLinear(p) => ("bond_based_linear", p),
-        };
-        self.law(parameters, dimension, &format!("physics.elasticity.law.{law}"));
         let imported = case.geometry.points.is_some();
         let mut used = BTreeSet::new();
+        if let Scheme::Hybrid(hybrid) = &case.discretization.scheme {
+            self.hybrid(hybrid, case);
+            for (k, name) in hybrid.standard.iter().enumerate() {
+                let path = format!("discretization.scheme.hybrid.standard[{k}]");
+                self.set_name(name, case, imported, &path, &mut used);
+            }
+        }
+        let elasticity = &case.physics.elasticity;
+        let path = format!("physics.elasticity.law.{}", elasticity.law.name());
+        self.law(&elasticity.law, dimension, &path);
+        if elasticity.law.is_state_based() {
+            self.state_based(case);
+        }
         if let Some(super::model::Failure::CriticalStretch(failure)) = &elasticity.failure {
             self.failure(failure, case, imported, &mut used);
         }
@@ -372,13 +379,43 @@ impl Checker<'_> {
         }
     }
 
-    fn law(&mut self, law: &BondBased, dimension: usize, path: &str) {
+    fn hybrid(&mut self, hybrid: &Hybrid, case: &Case) {
+        let path = "discretization.scheme.hybrid";
+        if hybrid.order % 2 == 1 {
+            let message = "the order of collocation is even";
+            self.error(&format!("{path}.order"), message, "an odd degree more changes nothing: take one less or more");
+        }
+        let off_lattice = [
+            (case.geometry.points.is_some(), "geometry.points"),
+            (case.geometry.perturb.is_some(), "geometry.perturb"),
+            (case.refinement.is_some(), "refinement"),
+            (case.discretization.surface_correction != SurfaceCorrection::None, "discretization.surface_correction"),
+        ];
+        for (_, key) in off_lattice.iter().filter(|(given, _)| *given) {
+            let message = format!("the hybrid scheme is for lattices, and with `{key}` the points are none");
+            self.error(path, message, &format!("remove `{key}`, or take `scheme = \"standard\"`"));
+        }
+        for (path, solver) in case.solver.stages() {
+            if !matches!(solver, Solver::VelocityVerlet(_) | Solver::RungeKutta(_)) {
+                let message =
+                    "the hybrid scheme is for motion: its operator is not symmetric, and this solver needs one";
+                let help = "use `solver.velocity_verlet` or `solver.runge_kutta`, or `scheme = \"standard\"`";
+                self.error(&path, message, help);
+            }
+        }
+    }
+
+    fn law(&mut self, kind: &Law, dimension: usize, path: &str) {
+        let law = kind.parameters();
         if law.plane.is_some() && dimension != 2 {
             self.error(
                 &format!("{path}.plane"),
                 format!("`plane` is for 2D, and this case is {dimension}D"),
                 "remove it",
             );
+        }
+        if kind.is_state_based() {
+            return self.poisson(law.poisson, law.plane, dimension, path);
         }
         if let Some(poisson) = law.poisson {
             let (fixed, name, why) = match (dimension, law.plane) {
@@ -394,6 +431,63 @@ impl Checker<'_> {
                     None => why.to_owned(),
                 };
                 self.error(&format!("{path}.poisson"), message, "remove the key, or give that value");
+            }
+        }
+    }
+
+    /// Poisson's ratio of a state-based law: positive moduli, and none in 1D.
+    fn poisson(&mut self, poisson: Option<f64>, plane: Option<Plane>, dimension: usize, path: &str) {
+        let (most, name, place) = match (dimension, plane) {
+            (1, _) => {
+                if poisson.is_some() {
+                    self.error(&format!("{path}.poisson"), "in 1D there is no Poisson ratio", "remove the key");
+                }
+                return;
+            }
+            (2, Some(Plane::Strain)) => (0.5, "1/2", "in plane strain"),
+            (2, _) => (1.0, "1", "in plane stress"),
+            _ => (0.5, "1/2", "in 3D"),
+        };
+        match poisson {
+            Some(poisson) if poisson > -1.0 && poisson < most => {}
+            Some(_) => {
+                let message = format!(
+                    "the state-based law needs a Poisson ratio above -1 and below {name} {place}, where the moduli are \
+                     positive and finite"
+                );
+                let help = if most < 1.0 { "for a nearly incompressible body: 0.49 or less" } else { "" };
+                self.error(&format!("{path}.poisson"), message, help);
+            }
+            None => {
+                let message = format!("missing key `poisson`: the state-based law has no ratio of its own {place}");
+                self.error(path, message, "add `poisson = <number>`, such as `poisson = 0.3`");
+            }
+        }
+    }
+
+    /// What state-based laws cannot do.
+    fn state_based(&mut self, case: &Case) {
+        let bonds = "use a bond-based law, or remove it";
+        if case.discretization.precision != Precision::Double {
+            let message = "the state-based law is computed in double precision only";
+            self.error("discretization.precision", message, "use `double`");
+        }
+        if case.discretization.surface_correction != SurfaceCorrection::None {
+            let message = "the state-based law has no surface correction: each family has a weighted volume of its own";
+            self.error("discretization.surface_correction", message, bonds);
+        }
+        if case.refinement.is_some() {
+            self.error("refinement", "the state-based law needs cells of one size", bonds);
+        }
+        if let Scheme::Hybrid(_) = &case.discretization.scheme {
+            let message = "the state-based law has no collocation rows in a run yet";
+            self.error("discretization.scheme", message, "use `scheme = \"standard\"`, or a bond-based law");
+        }
+        for (path, solver) in case.solver.stages() {
+            if matches!(solver, Solver::Static(_) | Solver::Newton(_) | Solver::QuasiStatic(_)) {
+                let message = "this solver needs a tangent, which the state-based law does not give";
+                let help = "use `dynamic_relaxation`, `velocity_verlet` or `runge_kutta`, or a bond-based law";
+                self.error(&path, message, help);
             }
         }
     }

@@ -2,6 +2,7 @@
 
 pub mod collocation;
 pub mod graded;
+pub mod hybrid;
 pub mod influence;
 pub mod moments;
 pub(crate) mod quadrature;
@@ -11,6 +12,7 @@ pub mod volume;
 
 pub use collocation::Collocation;
 pub use graded::Scaling;
+pub use hybrid::Regions;
 pub use influence::Influence;
 pub use standard::{BondWeights, Operator};
 pub use surface::Correction;

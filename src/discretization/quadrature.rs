@@ -38,7 +38,6 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
 }
 
 /// ∫ f from `low` to `high` with `n` points, at most 40.
-#[cfg(test)]
 pub(crate) fn integrate(f: impl Fn(f64) -> f64, low: f64, high: f64, n: usize) -> f64 {
     use std::sync::OnceLock;
     // Kept, because nested integrals ask for the same rule at every point.

@@ -19,19 +19,23 @@ use crate::lane::polynomial;
 /// Points in a chunk: the unit that threads share out, and of the ordered sums.
 pub const CHUNK: usize = 512;
 
-/// Puts the input values of each point side by side, zeros behind.
+/// Puts the input values of each point side by side, four of them and zeros behind; those beyond four stand in records of
+/// their own, behind the records of all points.
 pub fn gather_input<T: Number, const I: usize>(input: &[&[T]; I], records: &mut Vec<[T; 4]>) {
     if I == 0 {
         return;
     }
-    records.resize(input[0].len(), [T::default(); 4]);
-    records.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, records)| {
-        for (k, record) in records.iter_mut().enumerate() {
-            for c in 0..I {
-                record[c] = input[c][chunk * CHUNK + k];
+    let n = input[0].len();
+    records.resize(n * I.div_ceil(4), [T::default(); 4]);
+    for (part, records) in records.chunks_mut(n.max(1)).enumerate() {
+        records.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, records)| {
+            for (k, record) in records.iter_mut().enumerate() {
+                for c in 4 * part..I.min(4 * part + 4) {
+                    record[c - 4 * part] = input[c][chunk * CHUNK + k];
+                }
             }
-        }
-    });
+        });
+    }
 }
 
 /// A sum over the families of a cloud.
@@ -42,7 +46,7 @@ pub struct Sum<'a, const D: usize, const I: usize, const O: usize, P: Packs, K> 
     pub profile: Profile<'a>,
     pub sites: SiteView<'a, P::Site>,
     pub states: StatesPointer,
-    /// The input values of a point side by side, zeros behind.
+    /// The input values of a point side by side, as [`gather_input`] puts them.
     pub input: &'a [[P::Field; 4]],
     pub output: [SharedSlice<P::Field>; O],
     pub kernel: &'a K,
@@ -171,6 +175,10 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         self.families.starts[point] as usize..self.families.starts[point + 1] as usize
     }
 
+    fn n_points(&self) -> usize {
+        self.families.starts.len() - 1
+    }
+
     fn words(&self) -> *mut u16 {
         self.states.0
     }
@@ -225,11 +233,10 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
     #[inline(always)]
     unsafe fn here<V: Ends<P::Field>>(&self, point: usize) -> [V::Held; I] {
         let mut held = [V::NOTHING; I];
-        if I > 0 {
-            let values = unsafe { self.input.get_unchecked(point) };
-            for c in 0..I {
-                held[c] = V::same(values[c]);
-            }
+        for c in 0..I {
+            let record = point + c / 4 * self.n_points();
+            let value = unsafe { self.input.get_unchecked(record) }[c % 4];
+            held[c] = if c >= I - K::ADDED { V::opposite(V::same(value)) } else { V::same(value) };
         }
         held
     }
@@ -270,8 +277,14 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         let mut relative = [V::splat(0.0); I];
         if I > 0 {
             let there = unsafe { V::gather(self.input.as_ptr(), index) };
-            for c in 0..I {
+            for c in 0..I.min(4) {
                 relative[c] = V::relative(there[c], here[c], mask);
+            }
+            if I > 4 {
+                let there = unsafe { V::gather(self.input.as_ptr().add(self.n_points()), index) };
+                for c in 4..I {
+                    relative[c] = V::relative(there[c - 4], here[c], mask);
+                }
             }
         }
         (bond, relative)

@@ -22,6 +22,7 @@ pub struct View<'a, const D: usize, B> {
     lattice: &'a Lattice<D>,
     pub families: &'a LatticeFamilies<D>,
     pub weights: &'a [f64],
+    blocks: &'a [u32],
     rows: Vec<Row<D, B>>,
 }
 
@@ -36,7 +37,13 @@ struct Row<const D: usize, B> {
 }
 
 impl<'a, const D: usize, B: Number> View<'a, D, B> {
-    pub fn new(body: &'a Body<D>, families: &'a LatticeFamilies<D>, weights: &'a [f64]) -> Self {
+    /// Over all blocks of the families, or over those in `within`.
+    pub fn new(
+        body: &'a Body<D>,
+        families: &'a LatticeFamilies<D>,
+        weights: &'a [f64],
+        within: Option<&'a [u32]>,
+    ) -> Self {
         let Arrangement::Lattice(lattice) = &body.cloud.arrangement else {
             unreachable!("lattice families belong to a lattice")
         };
@@ -52,17 +59,16 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
                 spring: B::from_f64(spring),
             }
         });
-        View { lattice, families, weights, rows: rows.collect() }
+        View { lattice, families, weights, blocks: within.unwrap_or(&families.blocks), rows: rows.collect() }
     }
 
     pub fn n_chunks(&self) -> usize {
-        self.families.blocks.len().div_ceil(CHUNK)
+        self.blocks.len().div_ceil(CHUNK)
     }
 
     /// The blocks of a chunk.
     pub fn blocks(&self, chunk: usize) -> &[u32] {
-        let blocks = &self.families.blocks;
-        &blocks[chunk * CHUNK..((chunk + 1) * CHUNK).min(blocks.len())]
+        &self.blocks[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.blocks.len())]
     }
 
     /// The first slot of a block.
@@ -222,6 +228,9 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         let mut held = [V::NOTHING; I];
         for c in 0..I {
             held[c] = unsafe { V::hold(self.input[c].as_ptr().add(first)) };
+            if c >= I - K::ADDED {
+                held[c] = V::opposite(held[c]);
+            }
         }
         held
     }

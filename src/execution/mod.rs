@@ -48,10 +48,12 @@ macro_rules! compiled {
 
 mod blocks;
 mod cloud;
+mod collocation;
 pub mod gradients;
 mod lattice;
 pub mod machine;
 mod packs;
+mod point_rows;
 mod rows;
 
 use std::ops::Range;
@@ -63,7 +65,9 @@ use crate::family::{Body, Bond, BondKernel, BondStates, Families};
 use crate::field::Number;
 use crate::lane::Lane;
 pub use blocks::BlockRow;
+pub use collocation::Limits;
 pub use packs::{Instructions, Packs};
+pub use point_rows::PointRows;
 
 /// Which bonds break: asked only about bonds strained beyond `threshold`, in the strain of the kernel.
 pub trait BreakRule<const D: usize>: Sync {
@@ -111,6 +115,8 @@ pub struct Exec {
     /// Input values of a cloud, a record a point.
     double: Vec<[f64; 4]>,
     single: Vec<[f32; 4]>,
+    /// Blocks of a lattice that sums run over; all if None.
+    within: Option<Vec<u32>>,
 }
 
 impl Default for Exec {
@@ -130,7 +136,15 @@ impl Exec {
     /// If this machine does not have it.
     pub fn on(instructions: Instructions) -> Self {
         assert!(Instructions::available().contains(&instructions), "{instructions:?} is not on this machine");
-        Exec { instructions, broken: Vec::new(), partial: Vec::new(), double: Vec::new(), single: Vec::new() }
+        let (double, single) = (Vec::new(), Vec::new());
+        Exec { instructions, broken: Vec::new(), partial: Vec::new(), double, single, within: None }
+    }
+
+    /// From here on, sums over bonds of a lattice leave out all but these blocks, and do not write there.
+    pub fn within(&mut self, blocks: &[u32]) {
+        let within = self.within.get_or_insert_default();
+        within.clear();
+        within.extend_from_slice(blocks);
     }
 
     /// output(x) = Σ kernel(bond, input(x), input(x′)) over the bonds of x that hold. Linear kernels are summed as rows
@@ -184,9 +198,10 @@ impl Exec {
         let instructions = self.instructions;
         match (&body.families, weights) {
             (Families::Lattice(families), BondWeights::Lattice(weights)) => {
-                let view = &lattice::View::new(body, families, weights);
+                let within = self.within.take();
+                let view = &lattice::View::new(body, families, weights, within.as_deref());
                 let sum = lattice::Sum::<D, I, O, P, _> { instructions, view, states, input, output, kernel };
-                if K::LINEAR && R::NEVER {
+                let broken = if K::LINEAR && R::NEVER {
                     let sum = rows::Sum::new(&sum);
                     self.each_chunk(view.n_chunks(), &|chunk| {
                         sum.run(chunk);
@@ -194,7 +209,9 @@ impl Exec {
                     })
                 } else {
                     self.each_chunk(view.n_chunks(), &|chunk| sum.run(chunk, rule))
-                }
+                };
+                self.within = within;
+                broken
             }
             (Families::Cloud(families), BondWeights::Cloud(weights)) => {
                 let mut records = std::mem::take(P::records(&mut self.double, &mut self.single));

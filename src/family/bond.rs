@@ -37,9 +37,12 @@ pub trait BondKernel<const D: usize, const I: usize, const O: usize>: Sync {
     /// Whether the summand is zero where the ends have the same values. Broken bonds are given as such, which saves
     /// a mask; the summands of other kernels are masked.
     const RELATIVE: bool = true;
+    /// How many of the values, the last ones, are given as the sum of those at the two ends instead of their difference;
+    /// as zero along a broken bond.
+    const ADDED: usize = 0;
 
     /// What decides about breaking and about the form: computed once, whichever form follows. `relative`: values at
-    /// x′ less values at x.
+    /// x′ less values at x, the last `ADDED` of them values at x′ and x added.
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, relative: &[L; I]) -> L;
 
     /// `sum` and the summand of x, exactly.

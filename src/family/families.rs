@@ -167,32 +167,41 @@ impl<const D: usize> LatticeFamilies<D> {
                 steps.push(step);
             }
         });
-        let axes_of = |step: &[i32; D]| (0..D).filter(|&d| step[d] != 0).fold(0u32, |bits, d| bits | 1 << d);
-        steps.sort_by_key(|step| (axes_of(step), step.iter().map(|c| c * c).sum::<i32>(), *step));
-        let (mut offsets, mut classes) = (Vec::new(), Vec::new());
-        for members in steps.chunk_by(|a, b| axes_of(a) == axes_of(b)) {
-            let axes: Vec<usize> = (0..D).filter(|&d| members[0][d] != 0).collect();
-            let first = offsets.len() as u32;
-            for signs in 0..1u32 << axes.len() {
-                for member in members {
-                    let mut step = *member;
-                    for (k, &d) in axes.iter().enumerate() {
-                        if signs >> k & 1 == 1 {
-                            step[d] = -step[d];
-                        }
-                    }
-                    let xi = step.map(|c| f64::from(c) * h);
-                    let shift = (0..D).map(|d| step[d] as isize * lattice.strides[d] as isize).sum();
-                    offsets.push(Offset { step, shift, xi, length: norm(&xi) });
-                }
-            }
-            classes.push(Class { first, members: members.len() as u32, axes: axes.len() as u32 });
-        }
+        let (steps, classes) = mirror_sequences(steps);
+        let offset = |step: [i32; D]| {
+            let xi = step.map(|c| f64::from(c) * h);
+            Offset { step, shift: lattice.shift(step), xi, length: norm(&xi) }
+        };
+        let offsets = steps.into_iter().map(offset).collect();
         let mut blocks: Vec<u32> = slots.iter().map(|&s| ((s as usize - lattice.guard) / BLOCK) as u32).collect();
         blocks.dedup();
         tile(lattice, n as usize, &mut blocks);
         LatticeFamilies { offsets, classes, blocks }
     }
+}
+
+/// All mirror images of steps without negative components, in the sequences of a [`LatticeFamilies`].
+pub fn mirror_sequences<const D: usize>(mut steps: Vec<[i32; D]>) -> (Vec<[i32; D]>, Vec<Class>) {
+    let axes_of = |step: &[i32; D]| (0..D).filter(|&d| step[d] != 0).fold(0u32, |bits, d| bits | 1 << d);
+    steps.sort_by_key(|step| (axes_of(step), step.iter().map(|c| c * c).sum::<i32>(), *step));
+    let (mut images, mut classes) = (Vec::new(), Vec::new());
+    for members in steps.chunk_by(|a, b| axes_of(a) == axes_of(b)) {
+        let axes: Vec<usize> = (0..D).filter(|&d| members[0][d] != 0).collect();
+        let first = images.len() as u32;
+        for signs in 0..1u32 << axes.len() {
+            for member in members {
+                let mut step = *member;
+                for (k, &d) in axes.iter().enumerate() {
+                    if signs >> k & 1 == 1 {
+                        step[d] = -step[d];
+                    }
+                }
+                images.push(step);
+            }
+        }
+        classes.push(Class { first, members: members.len() as u32, axes: axes.len() as u32 });
+    }
+    (images, classes)
 }
 
 /// Bytes of a field that the rows of a tile may take in all planes that its families reach: half of a small second-level

@@ -8,6 +8,8 @@ pub mod states;
 mod tree;
 
 pub use bond::{Bond, BondKernel, BondLaw};
-pub use families::{Body, Class, CloudFamilies, Families, FixedSites, GROUP, LatticeFamilies, Offset, Sites};
+pub use families::{
+    Body, Class, CloudFamilies, Families, FixedSites, GROUP, LatticeFamilies, Offset, Sites, mirror_sequences,
+};
 pub use graded::{Grading, Rule, Update};
 pub use states::BondStates;

@@ -63,6 +63,11 @@ impl<const D: usize> Lattice<D> {
         cell
     }
 
+    /// From a slot to that of the cell `step` away, in slots.
+    pub fn shift(&self, step: [i32; D]) -> isize {
+        (0..D).map(|d| step[d] as isize * self.strides[d] as isize).sum()
+    }
+
     /// x of a cell, m.
     #[inline]
     pub fn position(&self, cell: [usize; D]) -> Vector<D> {

@@ -69,6 +69,10 @@ impl History {
         if source.adapted().is_some() {
             columns.extend(["points", "refined"].map(String::from));
         }
+        if source.hybrid().is_some() {
+            let names = ["standard_fraction", "bond_evaluations", "row_evaluations", "momentum_drift"];
+            columns.extend(names.map(String::from));
+        }
         columns.extend(source.reactions().iter().map(|(name, _)| format!("reaction_{name}")));
         Table::new(&self.path, columns)
     }
@@ -113,6 +117,9 @@ impl History {
         }
         if look.source.adapted().is_some() {
             row.extend([look.source.facts().points as f64, b.refined]);
+        }
+        if let Some(work) = look.source.hybrid() {
+            row.extend([work.standard[0], work.bonds as f64, work.nodes as f64, b.momentum_defect]);
         }
         row.extend(look.source.reactions().iter().map(|(_, value)| value));
         Some(row)

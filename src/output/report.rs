@@ -53,6 +53,8 @@ pub struct Report {
     pub crack_tip: Option<Tip>,
     /// Null where cells do not follow the solution.
     pub refinement: Option<Refinement>,
+    /// Null in the standard scheme.
+    pub hybrid: Option<Hybrid>,
     /// Of static solvers, the one that was not finished included; empty for others.
     pub load_steps: Vec<LoadStep>,
     pub state_hash: String,
@@ -73,6 +75,17 @@ pub struct Refinement {
     pub families_found_anew: f64,
     /// Points that saw, with a larger horizon, a place where finer cells were wanted: the most at any time.
     pub points_seen_by_coarser: usize,
+}
+
+/// What the hybrid scheme had to do.
+#[derive(Debug, Clone, Copy, Serialize, PartialEq)]
+pub struct Hybrid {
+    /// Fraction of the points that summed their bonds, at the start and at the end.
+    pub standard_fraction_at_start: f64,
+    pub standard_fraction: f64,
+    /// Bonds that were visited, all evaluations together, and points of rows.
+    pub bond_evaluations: u64,
+    pub row_evaluations: u64,
 }
 
 /// Where the time went. The first three follow each other; writing goes on beside them.

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::field::{Field, Values};
 use crate::physics::elasticity::surface::SurfaceEffect;
+use crate::problem::hybrid::Work;
 use crate::problem::{Adapted, Balance};
 
 /// A model that outputs look at. Asking for a field may compute it, hence the `&mut`.
@@ -28,6 +29,10 @@ pub trait Source {
     fn reactions(&self) -> Vec<(String, f64)>;
     /// What refinement has done; None where cells do not follow the solution.
     fn adapted(&self) -> Option<Adapted> {
+        None
+    }
+    /// What the hybrid scheme has to do; None in the standard scheme.
+    fn hybrid(&self) -> Option<Work> {
         None
     }
     fn hash(&self) -> String;

@@ -502,7 +502,7 @@ mod tests {
         let failure = Some(CriticalStretch::uniform(1e-3).scaled(&grading.horizons, scaling.horizon));
         let body = scaling.body(cloud, grading);
         let operator = scaling.operator(&body, &Update::default(), None, None);
-        let physics = Elasticity { law: BondBasedLinear, density: 1.0, operator, failure };
+        let physics = Elasticity { law: BondBasedLinear, density: 1.0, operator, failure, state_based: None };
         let mut state = physics.initial_state::<D, Double>(&body);
         let mut cut = 0;
         for crack in &cracks {

@@ -651,7 +651,7 @@ mod tests {
         }
         let body = standard::body(cloud, 2.6, rule);
         let operator = Operator::standard(&body, 1.0, Influence::Linear, rule);
-        let physics = Elasticity { law, density: 1.0, operator, failure: None };
+        let physics = Elasticity { law, density: 1.0, operator, failure: None, state_based: None };
         let mut states = BondStates::whole(&body);
         if let Some(crack) = (D == 2).then(|| Crack::Polyline(vec![[0.0, 5.2], [9.1, 5.2]])) {
             assert!(states.cut(&body, &crack, 1e-9) > 0);

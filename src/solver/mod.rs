@@ -1,6 +1,7 @@
 //! How time advances, and how bodies come to rest. A solver sees flat vectors and a right-hand side, never a point, a bond or a material.
 
 pub mod dynamic_relaxation;
+pub mod forward_euler;
 pub mod linear_solver;
 pub mod newton;
 pub mod runge_kutta;
@@ -8,6 +9,7 @@ pub mod statics;
 pub mod velocity_verlet;
 
 pub use bondwise_linear as linear;
+pub use forward_euler::ForwardEuler;
 pub use runge_kutta::RungeKutta;
 pub use statics::Statics;
 pub use velocity_verlet::VelocityVerlet;
@@ -49,6 +51,8 @@ pub struct Unknowns<'a, T> {
     /// Displacements below this count as zero. Ahead of a wave they fall off without end, and processors are
     /// slow with numbers near the smallest that they know.
     pub negligible: f64,
+    /// τ (s) and where u + τ v is wanted after a drift, if it is.
+    pub ahead: Option<(f64, &'a mut [T])>,
 }
 
 /// Where a run stands.

@@ -154,6 +154,7 @@ mod tests {
                 force: std::slice::from_ref(f),
                 inertia: 1.0,
                 negligible: 0.0,
+                ahead: None,
             }
         }
         fn constrain(&mut self, _: Stage, _: f64, _: f64) {}

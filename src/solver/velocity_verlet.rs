@@ -32,13 +32,23 @@ impl VelocityVerlet {
     }
 }
 
-/// v = keep v + Δt/2 force/ρ; u = u + Δt v: in one pass over memory.
+/// v = keep v + Δt/2 force/ρ; u = u + Δt v, and u + τ v if wanted: in one pass over memory.
 fn kick_and_drift<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, keep: f64) {
     let [keep, factor] = [keep, 0.5 * dt / unknowns.inertia].map(T::from_f64);
     let [still, slow] = [unknowns.negligible, slow(unknowns.negligible, dt)].map(T::from_f64);
     let dt = T::from_f64(dt);
-    let Unknowns { displacement, velocity, force, .. } = unknowns;
+    let Unknowns { displacement, velocity, force, ahead, .. } = unknowns;
     let vectors = displacement.par_chunks_mut(CHUNK).zip(velocity.par_chunks_mut(CHUNK)).zip(force.par_chunks(CHUNK));
+    if let Some((tau, ahead)) = ahead {
+        let tau = T::from_f64(*tau);
+        return vectors.zip(ahead.par_chunks_mut(CHUNK)).for_each(|(((u, v), f), ahead)| {
+            for (((u, v), f), ahead) in u.iter_mut().zip(v).zip(f).zip(ahead) {
+                *v = unless_below(slow, keep * *v + factor * *f);
+                *u = unless_below(still, *u + dt * *v);
+                *ahead = *u + tau * *v;
+            }
+        });
+    }
     vectors.for_each(|((u, v), f)| {
         for ((u, v), f) in u.iter_mut().zip(v).zip(f) {
             *v = unless_below(slow, keep * *v + factor * *f);
@@ -85,6 +95,7 @@ mod tests {
                 force: std::slice::from_ref(f),
                 inertia: 1.0,
                 negligible: 0.0,
+                ahead: None,
             }
         }
         fn constrain(&mut self, _: Stage, _: f64, _: f64) {}

@@ -48,7 +48,7 @@ fn from_bond_sums<const D: usize>(hypothesis: Hypothesis, rule: PartialVolume, m
     let (body, middle) = block::<D>(rule, m);
     let strength = micromodulus(hypothesis, &influence, 1.0, m);
     let operator = Operator::standard(&body, strength, influence, rule);
-    let physics = Elasticity { law: BondBasedLinear, density: 1.0, operator, failure: None };
+    let physics = Elasticity { law: BondBasedLinear, density: 1.0, operator, failure: None, state_based: None };
     let mut exec = Exec::default();
     let mut energy = |strain: [f64; 2]| {
         let mut state: State = physics.initial_state(&body);

@@ -15,7 +15,10 @@ mod energy_drift;
 pub mod exact;
 mod family_counts;
 mod fracture_work;
+mod hybrid_branching;
 mod hybrid_example_1;
+mod hybrid_example_2;
+mod hybrid_wave;
 mod kirsch;
 mod navier;
 mod precision;
@@ -93,6 +96,9 @@ pub const STUDIES: &[Study] = &[
     refined_branching::STUDY,
     surface_effect::STUDY,
     hybrid_example_1::STUDY,
+    hybrid_example_2::STUDY,
+    hybrid_branching::STUDY,
+    hybrid_wave::STUDY,
     bar::SEVEN_NODES,
     bar::CONVERGENCE,
     bar::TABLE_1,

@@ -30,6 +30,11 @@
 //! | weight, 1/│ξ│², weight/│ξ│ | 3 | 3 |
 //! | **in all** | 3 D + 24 | 3 D + 20 |
 //!
+//! A state-based solid (`physics::elasticity::state_based`) takes two passes. The first has η, strain and watch, 5 D + 1, s by
+//! a polynomial, 13, c ω̃ │ξ│ β V′ and the sum, 3; the second η, strain and watch again, p + p′ and q + q′, 2, a polynomial, 13,
+//! p + (q − p) g and × spring, 4, sum + factor (ξ + η), 2 D: 12 D + 37, 73 in 3D, and on a cloud the bond twice. A point
+//! takes one operation more, p = h S, and its passes read and write S, h, p and q once more each: 6 numbers.
+//!
 //! Beside its bonds, a component of a point takes 11 operations a step: kick and drift 5, kick 3, kinetic energy and
 //! momentum 3 (`solver::velocity_verlet`, `Problem::motion`); comparisons with negligible numbers are not counted.
 //!
@@ -74,6 +79,9 @@ impl Work {
         let components = sizes.dimension as f64;
         let number = if precision == "single" { 4.0 } else { 8.0 };
         let mut bytes = 11.0 * components * number * points + bonds / 8.0;
+        if problem.solid {
+            bytes += (components + 6.0) * number * points + bonds / 8.0;
+        }
         if problem.path == Path::Cloud {
             let site = if precision == "double" { 4.0 * 8.0 } else { 4.0 * 4.0 };
             bytes += (8.0 * number + site + 16.0) * points + 4.0 * bonds;
@@ -89,6 +97,10 @@ fn operations(problem: &Problem, dimension: usize, single: bool) -> usize {
         (false, false) => 7 * dimension + 15,
         (false, true) => 7 * dimension + 9,
     };
+    if problem.solid {
+        let bonds = if problem.path == Path::Cloud { 3 * dimension + 24 } else { 0 };
+        return 12 * dimension + 37 + 2 * bonds;
+    }
     match (problem.path, single) {
         (Path::Lattice, _) => law,
         (Path::Rows, _) => dimension + dimension * dimension,
@@ -109,5 +121,6 @@ mod tests {
             let problem = Problem::named(name).unwrap();
             assert_eq!([false, true].map(|s| operations(problem, 3, s)), [double, single], "{name}");
         }
+        assert_eq!(operations(Problem::named("lps3d").unwrap(), 3, false), 73);
     }
 }

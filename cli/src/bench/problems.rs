@@ -41,18 +41,20 @@ pub struct Problem {
     pub path: Path,
     /// Whether the law is linearised.
     pub linear: bool,
+    /// Whether the body is a state-based solid, which takes two passes over the bonds.
+    pub solid: bool,
     /// Whether bonds break while it is timed.
     pub breaking: bool,
 }
 
 /// All of them, in the order of the table.
 #[rustfmt::skip] // a table
-pub const PROBLEMS: [Problem; 9] = {
+pub const PROBLEMS: [Problem; 11] = {
     use {Body::*, Path::*};
     const fn problem(
         name: &'static str, body: Body, path: Path, linear: bool, breaking: bool, about: &'static str,
     ) -> Problem {
-        Problem { name, about, body, path, linear, breaking }
+        Problem { name, about, body, path, linear, solid: false, breaking }
     }
     [
         problem("block3d", Cube, Lattice, false, false,
@@ -73,6 +75,10 @@ pub const PROBLEMS: [Problem; 9] = {
             "the bundled case crack_branching in its first steps, no bond breaks"),
         problem("plate2d-breaking", Plate, Lattice, false, true,
             "the same while its crack runs"),
+        Problem { solid: true, ..problem("lps3d", Cube, Lattice, false, false,
+            "the cube as a state-based solid: both passes over the bonds") },
+        Problem { solid: true, ..problem("lps3d-cloud", Cube, Cloud, false, false,
+            "the scattered cloud as a state-based solid") },
     ]
 };
 
@@ -130,7 +136,13 @@ impl Problem {
         let disturbed = "perturb = { amplitude = 0.05, seed = 1, shuffle = true }";
         let title = self.name;
         let perturb = if self.path == Path::Cloud { disturbed } else { "" };
-        let law = if self.linear { "bond_based_linear" } else { "bond_based" };
+        let law = match (self.solid, self.linear) {
+            (false, false) => "bond_based",
+            (false, true) => "bond_based_linear",
+            (true, _) => "state_based",
+        };
+        // That of bonds, so that the bodies of all problems are of one material.
+        let poisson = if self.solid { ", poisson = 0.25" } else { "" };
         format!(
             r#"
 [case]
@@ -147,7 +159,7 @@ spacing = 5e-4
 horizon_ratio = 3.015
 partial_volumes = "none"
 [physics.elasticity]
-law = {{ {law} = {{ young = 72e9, density = 2440 }} }}
+law = {{ {law} = {{ young = 72e9, density = 2440{poisson} }} }}
 {failure}
 [[conditions]]
 on = "all"

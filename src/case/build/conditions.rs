@@ -7,12 +7,10 @@ use super::Builder;
 use crate::conditions::load::Scale;
 use crate::conditions::profile::VARIABLES;
 use crate::conditions::{Load, Prescribed, Profile, Quantity};
-use crate::discretization::Influence;
 use crate::error::{Error, Result};
 use crate::expression::{Expression, nearest};
 use crate::field::Vector;
 use crate::geometry::{Cloud, Shape};
-use crate::physics::elasticity::moduli::{self, Hypothesis};
 use crate::physics::failure::CriticalStretch;
 use crate::physics::failure::critical_stretch::PairRule;
 
@@ -125,19 +123,13 @@ impl<const D: usize> Builder<'_, D> {
         }
     }
 
-    pub(super) fn failure(
-        &self,
-        cloud: &Cloud<D>,
-        hypothesis: Hypothesis,
-        influence: &Influence,
-        strength: f64,
-        horizon: f64,
-    ) -> Result<Option<CriticalStretch>> {
+    /// `critical`: the critical stretch of a fracture energy, J/m².
+    pub(super) fn failure(&self, cloud: &Cloud<D>, critical: &dyn Fn(f64) -> f64) -> Result<Option<CriticalStretch>> {
         let Some(model::Failure::CriticalStretch(failure)) = &self.case.value.physics.elasticity.failure else {
             return Ok(None);
         };
         let stretch = |energy: Option<f64>, stretch: Option<f64>| match energy {
-            Some(energy) => moduli::critical_stretch(hypothesis, influence, strength, energy, horizon),
+            Some(energy) => critical(energy),
             None => stretch.unwrap_or(f64::INFINITY),
         };
         let rules: Vec<PairRule> = failure

@@ -62,6 +62,7 @@ pub(super) fn name(field: FieldName) -> &'static str {
         FieldName::Force => "force",
         FieldName::Damage => "damage",
         FieldName::StrainEnergy => "strain_energy",
+        FieldName::Scheme => "scheme",
     }
 }
 

@@ -10,15 +10,24 @@
 //!
 //! equal to the integral for every polynomial up to the order. Shojaei et al. 2022, eqs. (32)-(60).
 //!
+//! Whether a row may be marched in time is known before the first step from its [`symbol`]; [`gate`] refuses those that may not.
+//!
 //! Deliberately absent: incomplete balls, for which the closed forms do not hold, and which points have rows.
 
+pub mod gate;
 pub mod rows;
+mod shared_row;
+mod state_based;
 mod support;
+pub mod symbol;
 mod symmetry;
 #[cfg(test)]
 mod tests;
 
 use bondwise_linear::SingularValues;
+pub use shared_row::{Pair, SharedRow};
+
+pub use symbol::Symbol;
 
 use super::Influence;
 use crate::error::{Error, Result};
@@ -61,6 +70,13 @@ impl Collocation {
     /// Monomials up to `order` through about `points` points, weighted as in the paper.
     pub fn new(order: u32, points: usize) -> Self {
         Collocation { order, points, exponent: Self::EXPONENT }
+    }
+
+    /// Points of the smallest auxiliary grid that has more points than a polynomial of this order has monomials.
+    pub fn fewest<const D: usize>(order: u32) -> usize {
+        let monomials = rows::monomials::<D>(order).len();
+        let sizes = (1..).map(|k| support::ball::<D>(f64::from(k)).len());
+        sizes.into_iter().find(|&size| size > monomials).unwrap_or(monomials)
     }
 
     /// The fit that all points of a lattice share. Lengths in m.

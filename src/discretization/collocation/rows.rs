@@ -45,6 +45,22 @@ pub fn elastic<const D: usize>(
     })
 }
 
+/// Mean derivatives of the monomial p(ξ/δ), with ω = ω̃ δ/|ξ|,
+///
+/// ```text
+/// g_a = (D/m) ∫ ω ξ_a p(ξ/δ) dV = (D/δ) ∫ ω̃ ξ_a/|ξ| p(ξ) dV / ∫ ω̃ |ξ| dV     (unit ball)
+/// ```
+///
+/// what dilatation and its gradient are sums of; 1/m. `influence` is ω̃.
+pub fn dilatation<const D: usize>(exponents: [u32; D], influence: &Influence, horizon: f64) -> [f64; D] {
+    let scale = D as f64 / (horizon * ball_moment(influence, [0; D], -1.0, 1.0));
+    std::array::from_fn(|a| {
+        let mut raised = exponents;
+        raised[a] += 1;
+        scale * ball_moment(influence, raised, 1.0, 1.0)
+    })
+}
+
 /// Diffusion on the monomial p(ξ/δ),
 ///
 /// ```text

@@ -27,17 +27,26 @@ pub fn ball<const D: usize>(radius: f64) -> Vec<[i32; D]> {
 /// | 2 | 5, 13, 29, 49, 81, … |
 /// | 3 | 7, 33, 123, 257, … |
 pub fn auxiliary_grid<const D: usize>(asked: usize) -> Vec<Vector<D>> {
+    let k = radius::<D>(asked);
+    let spacing = 1.0 / f64::from(k);
+    let away = ball::<D>(f64::from(k)).into_iter().filter(|point| *point != [0; D]);
+    away.map(|point| point.map(|i| f64::from(i) * spacing)).collect()
+}
+
+/// Numbers of points of that grid and of the grids with one spacing to the rim less and more.
+pub fn neighbouring_grids<const D: usize>(asked: usize) -> Vec<usize> {
+    let k = radius::<D>(asked);
+    (k.saturating_sub(1).max(1)..=k + 1).map(|k| ball::<D>(f64::from(k)).len()).collect()
+}
+
+/// Spacings from the source to the rim.
+fn radius<const D: usize>(asked: usize) -> u32 {
+    let off = |k: u32| ball::<D>(f64::from(k)).len().abs_diff(asked);
     let mut k = 1;
-    let mut points = ball::<D>(1.0);
-    loop {
-        let next = ball::<D>(f64::from(k + 1));
-        if next.len().abs_diff(asked) > points.len().abs_diff(asked) {
-            let spacing = 1.0 / f64::from(k);
-            let away = points.into_iter().filter(|point| *point != [0; D]);
-            return away.map(|point| point.map(|i| f64::from(i) * spacing)).collect();
-        }
-        (points, k) = (next, k + 1);
+    while off(k + 1) <= off(k) {
+        k += 1;
     }
+    k
 }
 
 /// Indices, ascending, of the points of the family nearest to those of the grid. Both in units of δ.

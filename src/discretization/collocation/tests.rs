@@ -264,67 +264,6 @@ fn what_cannot_be_fitted_is_refused() {
     assert!(fit.diffusive(&Influence::Constant, 1.0, 4.0).unwrap_err().to_string().contains("q = 4"));
 }
 
-/// Least and largest eigenvalue of plane elasticity on an endless lattice, E = δ = 1: Σ K (cos(k·step) − 1) over waves k.
-fn eigenvalues(collocation: Collocation, m: f64) -> (f64, f64) {
-    let fit = collocation.on_lattice::<2>(1.0 / m, 1.0).unwrap();
-    let weights = fit.elastic(&Influence::Constant, 9.0 / PI);
-    let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
-    for (i, j) in (0..61 * 61).map(|n| (n / 61, n % 61)) {
-        let mut symbol = [[0.0; 2]; 2];
-        for (step, weight) in fit.steps.iter().flatten().zip(&weights) {
-            let phase = PI / 60.0 * f64::from(i * step[0] + j * step[1]);
-            (0..4).for_each(|n| symbol[n / 2][n % 2] += weight[n / 2][n % 2] * (phase.cos() - 1.0));
-        }
-        let [[a, b], [_, d]] = symbol;
-        let root = (0.25 * (a - d).powi(2) + b * b).sqrt();
-        least = least.min(0.5 * (a + d) - root);
-        largest = largest.max(0.5 * (a + d) + root);
-    }
-    (least, largest)
-}
-
-/// V-C8. Spectral radii: an independent script, E/δ², two decimals.
-#[test]
-fn waves_on_a_plane_have_the_known_spectral_radii_and_none_grows_in_order_two() {
-    for (points, m, exponent, radius) in [
-        (13, 3.0, 16.0, 13.45),
-        (13, 4.0, 16.0, 22.30),
-        (13, 4.0, 9.0, 17.69),
-        (13, 5.0, 16.0, 16.46),
-        (29, 3.0, 16.0, 36.91),
-        (29, 4.0, 16.0, 69.15),
-    ] {
-        let (least, largest) = eigenvalues(Collocation { exponent, ..Collocation::new(2, points) }, m);
-        assert!((least + radius).abs() <= 5e-3, "{points} points, m = {m}: {least}");
-        // Rounding of the sums, at rest.
-        assert!(largest <= 1e-12, "{points} points, m = {m}: {largest}");
-    }
-    // What order 4 with the paper's weight must not be used for.
-    let (_, largest) = eigenvalues(Collocation::new(4, 49), 4.0);
-    assert!(largest > 30.0, "{largest}");
-}
-
-/// The same on a line: order 2 near a difference over δ/2, 16 E/δ²; order 4 grows; order 6 is stiff.
-#[test]
-fn waves_on_a_line_grow_in_order_four_alone() {
-    let eigenvalues = |order, points| {
-        let fit = Collocation::new(order, points).on_lattice::<1>(1.0 / 12.0, 1.0).unwrap();
-        let weights = fit.elastic(&Influence::Constant, 2.0);
-        let wave = |k: u32| -> f64 {
-            let phase = |step: &[i32; 1]| PI / 400.0 * f64::from(k) * f64::from(step[0]);
-            fit.steps.iter().flatten().zip(&weights).map(|(s, w)| w[0][0] * (phase(s).cos() - 1.0)).sum()
-        };
-        (0..=400).map(wave).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
-    };
-    // An independent script, as printed: 16.0, "up to +74", "118".
-    let (least, largest) = eigenvalues(2, 5);
-    assert!((least + 16.0).abs() <= 0.05 && largest <= 1e-12, "{least} {largest}");
-    let (_, largest) = eigenvalues(4, 11);
-    assert!((largest - 74.0).abs() <= 0.5, "{largest}");
-    let (least, largest) = eigenvalues(6, 13);
-    assert!((least + 118.0).abs() <= 0.5 && largest <= 1e-12, "{least} {largest}");
-}
-
 /// Sets of points that ties make larger than asked for.
 #[test]
 fn ties_on_a_lattice_are_taken_together() {

@@ -156,6 +156,13 @@ macro_rules! ends {
                 if mask & 0xf == 0xf { relative } else { relative.keep(mask) }
             }
             #[inline(always)]
+            fn opposite(mut here: Self::Held) -> Self::Held {
+                for k in 0..N {
+                    here[k] = -here[k];
+                }
+                here
+            }
+            #[inline(always)]
             fn twice(mut here: Self::Held) -> Self::Held {
                 for k in 0..N {
                     here[k] += here[k];

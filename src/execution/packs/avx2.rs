@@ -286,6 +286,10 @@ impl Ends<f64> for F64 {
         kept(F64(there) - F64(here), mask)
     }
     #[inline(always)]
+    fn opposite(here: Self::Held) -> Self::Held {
+        (F64::splat(0.0) - F64(here)).0
+    }
+    #[inline(always)]
     fn twice(here: Self::Held) -> Self::Held {
         (F64(here) + F64(here)).0
     }
@@ -323,6 +327,10 @@ impl Ends<f32> for F32 {
         kept(F32(there) - F32(here), mask)
     }
     #[inline(always)]
+    fn opposite(here: Self::Held) -> Self::Held {
+        (F32::splat(0.0) - F32(here)).0
+    }
+    #[inline(always)]
     fn twice(here: Self::Held) -> Self::Held {
         (F32(here) + F32(here)).0
     }
@@ -355,6 +363,10 @@ impl Ends<f64> for F32 {
     #[inline(always)]
     fn relative(there: Self::Held, here: Self::Held, mask: u16) -> Self {
         kept(narrow(F64(there) - F64(here)), mask)
+    }
+    #[inline(always)]
+    fn opposite(here: Self::Held) -> Self::Held {
+        <F64 as Ends<f64>>::opposite(here)
     }
     #[inline(always)]
     fn twice(here: Self::Held) -> Self::Held {

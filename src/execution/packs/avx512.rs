@@ -291,6 +291,10 @@ impl Ends<f64> for F64 {
         unsafe { F64([_mm512_maskz_sub_pd(low, there[0], here[0]), _mm512_maskz_sub_pd(high, there[1], here[1])]) }
     }
     #[inline(always)]
+    fn opposite(here: Self::Held) -> Self::Held {
+        (F64::splat(0.0) - F64(here)).0
+    }
+    #[inline(always)]
     fn twice(here: Self::Held) -> Self::Held {
         (F64(here) + F64(here)).0
     }
@@ -328,6 +332,10 @@ impl Ends<f32> for F32 {
         unsafe { F32(_mm512_maskz_sub_ps(mask, there, here)) }
     }
     #[inline(always)]
+    fn opposite(here: Self::Held) -> Self::Held {
+        (F32::splat(0.0) - F32(here)).0
+    }
+    #[inline(always)]
     fn twice(here: Self::Held) -> Self::Held {
         (F32(here) + F32(here)).0
     }
@@ -360,6 +368,10 @@ impl Ends<f64> for F32 {
     #[inline(always)]
     fn relative(there: Self::Held, here: Self::Held, mask: u16) -> Self {
         narrow(F64(there) - F64(here)).keep(mask)
+    }
+    #[inline(always)]
+    fn opposite(here: Self::Held) -> Self::Held {
+        <F64 as Ends<f64>>::opposite(here)
     }
     #[inline(always)]
     fn twice(here: Self::Held) -> Self::Held {

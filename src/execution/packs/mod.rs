@@ -133,6 +133,8 @@ pub trait Ends<F: Number>: Sized {
     unsafe fn gather(records: *const [F; 4], index: *const u32) -> [Self::Held; 4];
     /// Values there less values here, zero in lanes without a bit.
     fn relative(there: Self::Held, here: Self::Held, mask: u16) -> Self;
+    /// Values with the other sign: what [`Ends::relative`] takes them from is added to them.
+    fn opposite(here: Self::Held) -> Self::Held;
     /// Twice the values.
     fn twice(here: Self::Held) -> Self::Held;
     /// Values on two sides, added, less twice the values between.

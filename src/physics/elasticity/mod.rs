@@ -4,14 +4,18 @@
 
 pub mod bond_based;
 pub mod moduli;
+pub mod state_based;
 pub mod surface;
 
-use crate::discretization::{BondWeights, Operator};
+use std::sync::Mutex;
+
+use crate::discretization::{BondWeights, Operator, Regions};
 use crate::execution::{BlockRow, BreakRule, Broken, Exec, Packs};
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
 use crate::field::{Double, Number, Precision, components, components_mut, dot};
 use crate::lane::Lane;
 use crate::physics::failure::CriticalStretch;
+use state_based::{Changing, StateBased};
 
 /// A law, its discretisation and its failure on one body.
 #[derive(Debug, Clone)]
@@ -22,6 +26,8 @@ pub struct Elasticity<L> {
     pub operator: Operator,
     /// None: bonds never break.
     pub failure: Option<CriticalStretch>,
+    /// The state-based solid that `law` gives the stretches of, in double precision; None: `law` is the whole law.
+    pub state_based: Option<StateBased>,
 }
 
 /// Everything that changes in a run of an elastic body.
@@ -37,6 +43,8 @@ pub struct State<P: Precision = Double> {
     pub states: BondStates,
     /// Broken since the start, pre-cracks not counted.
     pub broken: Broken,
+    /// Of a state-based solid: p, what dilatation pulls with, now and one evaluation before, by slot; else empty.
+    pub tension: [Vec<f64>; 2],
 }
 
 impl<L> Elasticity<L> {
@@ -49,23 +57,34 @@ impl<L> Elasticity<L> {
             force: zeros(),
             states: BondStates::whole(body),
             broken: Broken::default(),
+            tension: Default::default(),
         }
     }
 
     /// Breaks the bonds that the displacements overstretch, then fills `state.force` with the internal force density.
     ///
     /// `dt`: the step that led to these displacements with the velocities as they are now, for the books of the
-    /// energy that broken bonds take; zero at the start.
-    pub fn evaluate<const D: usize, P: Packs>(&self, body: &Body<D>, exec: &mut Exec, state: &mut State<P>, dt: f64)
-    where
+    /// energy that broken bonds take; zero at the start. `hybrid`: the points whose bonds are not asked, if any.
+    pub fn evaluate<const D: usize, P: Packs>(
+        &self,
+        body: &Body<D>,
+        exec: &mut Exec,
+        state: &mut State<P>,
+        dt: f64,
+        hybrid: Option<&Edge<'_>>,
+    ) where
         L: BondLaw<D>,
     {
+        if let Some(solid) = &self.state_based {
+            let now = state.changing();
+            return solid.evaluate(body, &self.operator.weights, self.failure.as_ref(), exec, now, dt);
+        }
         let (input, output) = (components::<D, _>(&state.displacement), components_mut::<D, _>(&mut state.force));
         let Some(failure) = &self.failure else {
             return self.force_density::<D, P>(body, exec, &state.states, input, output);
         };
         let (law, velocity) = (self.law, components::<D, _>(&state.velocity));
-        let rule = Breaking::<D, L, P::Field> { failure, law, displacement: input, velocity, dt };
+        let rule = Breaking::<D, L, P::Field> { failure, law, displacement: input, velocity, dt, hybrid };
         let now = self.break_by::<D, P>(body, exec, &mut state.states, input, output, &rule);
         state.broken.bonds += now.bonds;
         state.broken.energy += now.energy;
@@ -83,6 +102,10 @@ impl<L> Elasticity<L> {
         L: BondLaw<D>,
     {
         let weights = &self.operator.weights;
+        if let Some(solid) = &self.state_based {
+            let (displacement, mut force) = (displacement.map(doubles), force.map(doubles_mut));
+            return solid.force_density(body, weights, exec, states, &displacement, &mut force);
+        }
         exec.sum_bonds::<D, D, D, P>(body, weights, states, displacement, force, &Force(self.law));
     }
 
@@ -99,6 +122,7 @@ impl<L> Elasticity<L> {
     where
         L: BondLaw<D>,
     {
+        assert!(self.state_based.is_none(), "bonds of a state-based solid break in `evaluate` only");
         let (weights, kernel) = (&self.operator.weights, Force(self.law));
         exec.sum_bonds_and_break::<D, D, D, P>(body, weights, states, displacement, force, &kernel, rule)
     }
@@ -109,10 +133,13 @@ impl<L> Elasticity<L> {
         body: &Body<D>,
         exec: &mut Exec,
         states: &BondStates,
-        diagonal: [&mut [f64]; D],
+        mut diagonal: [&mut [f64]; D],
     ) where
         L: BondLaw<D>,
     {
+        if let Some(solid) = &self.state_based {
+            return solid.diagonal(body, &self.operator.weights, exec, states, &mut diagonal);
+        }
         let (weights, kernel) = (&self.operator.weights, Diagonal(self.law));
         exec.sum_bonds::<D, 0, D, Double>(body, weights, states, [], diagonal, &kernel);
     }
@@ -143,6 +170,7 @@ impl<L> Elasticity<L> {
     where
         L: BondLaw<D>,
     {
+        assert!(self.state_based.is_none(), "points of a state-based solid feel more than their families");
         let law = self.law;
         Exec::blocks(body, &self.operator.weights, states, displacement, |bond, eta| law.stiffness(bond, eta))
     }
@@ -158,6 +186,10 @@ impl<L> Elasticity<L> {
         L: BondLaw<D>,
     {
         let input = components::<D, _>(&state.displacement);
+        if let Some(solid) = &self.state_based {
+            let (input, density) = (input.map(doubles), doubles_mut(density));
+            return solid.strain_energy_density(body, &self.operator.weights, exec, &state.states, &input, density);
+        }
         let (weights, kernel) = (&self.operator.weights, Energy(self.law));
         exec.sum_bonds::<D, D, 1, P>(body, weights, &state.states, input, [density], &kernel);
     }
@@ -181,6 +213,9 @@ impl<L> Elasticity<L> {
     where
         L: BondLaw<D>,
     {
+        if let Some(solid) = &self.state_based {
+            return solid.stable_step(self.density);
+        }
         let stiffest = match (&body.families, &self.operator.weights) {
             (Families::Lattice(families), BondWeights::Lattice(weights)) => {
                 families.offsets.iter().zip(weights).map(|(o, w)| self.law.tangent(o.length, *w)).sum::<f64>()
@@ -196,6 +231,29 @@ impl<L> Elasticity<L> {
         };
         (2.0 * self.density / stiffest).sqrt()
     }
+}
+
+impl<P: Precision> State<P> {
+    fn changing(&mut self) -> Changing<'_> {
+        Changing {
+            displacement: doubles(&self.displacement),
+            velocity: doubles(&self.velocity),
+            force: doubles_mut(&mut self.force),
+            states: &mut self.states,
+            broken: &mut self.broken,
+            tension: &mut self.tension,
+        }
+    }
+}
+
+const DOUBLE_ONLY: &str = "state-based solids are of double precision";
+
+fn doubles<F: Number>(field: &[F]) -> &[f64] {
+    F::doubles(field).expect(DOUBLE_ONLY)
+}
+
+fn doubles_mut<F: Number>(field: &mut [F]) -> &mut [f64] {
+    F::doubles_mut(field).expect(DOUBLE_ONLY)
 }
 
 /// Σ f
@@ -311,6 +369,32 @@ impl<const D: usize> BondKernel<D, 0, 1> for Weight {
     }
 }
 
+/// Where bonds end at points with a row, which stands for unbroken bonds: such bonds do not break, and are told of.
+pub struct Edge<'a> {
+    pub regions: &'a Regions,
+    pub overstretched: Mutex<Overstretched>,
+}
+
+/// Bonds beyond their critical stretch, by the slots of both ends, in no order.
+#[derive(Debug, Default)]
+pub struct Overstretched {
+    /// Broken.
+    pub broken: Vec<u32>,
+    /// With an end that has a row, and whole.
+    pub held: Vec<u32>,
+}
+
+impl Edge<'_> {
+    /// Takes note of a bond; whether it may break.
+    fn may_break(&self, here: usize, there: usize) -> bool {
+        let free = !self.regions.has_row(here) && !self.regions.has_row(there);
+        let mut list = self.overstretched.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let list = if free { &mut list.broken } else { &mut list.held };
+        list.extend([here as u32, there as u32]);
+        free
+    }
+}
+
 /// The critical stretch, and what is needed to know the energy that a broken bond takes.
 struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
     failure: &'a CriticalStretch,
@@ -318,6 +402,7 @@ struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
     displacement: [&'a [F]; D],
     velocity: [&'a [F]; D],
     dt: f64,
+    hybrid: Option<&'a Edge<'a>>,
 }
 
 impl<const D: usize, L: BondLaw<D>, F: Number> BreakRule<D> for Breaking<'_, D, L, F> {
@@ -327,6 +412,7 @@ impl<const D: usize, L: BondLaw<D>, F: Number> BreakRule<D> for Breaking<'_, D, 
 
     fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
         strain > self.law.strain_at(self.failure.of(here, there))
+            && self.hybrid.is_none_or(|edge| edge.may_break(here, there))
     }
 
     /// Half of w(η) + ½ f(η)·Δη, with η at the start of the step in which the bond breaks and Δη its change in the

@@ -101,7 +101,7 @@ impl Hypothesis {
     }
 
     /// ∫ ω |ξ| dV, in m^(D+1).
-    fn stretch_moment(&self, influence: &Influence, horizon: f64) -> f64 {
+    pub(super) fn stretch_moment(&self, influence: &Influence, horizon: f64) -> f64 {
         match self.dimension() {
             1 => ball_moment(influence, [0], -1.0, horizon),
             2 => ball_moment(influence, [0, 0], -1.0, horizon),
@@ -110,7 +110,7 @@ impl Hypothesis {
     }
 
     /// ∫ ω |ξ| |ξ₁| dV, in m^(D+2).
-    fn crossing_moment(&self, influence: &Influence, horizon: f64) -> f64 {
+    pub(super) fn crossing_moment(&self, influence: &Influence, horizon: f64) -> f64 {
         match self.dimension() {
             1 => absolute_ball_moment(influence, [1], -1.0, horizon),
             2 => absolute_ball_moment(influence, [1, 0], -1.0, horizon),

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Elasticity;
+use super::state_based::Moduli;
 use crate::discretization::{Correction, Scaling};
 use crate::execution::Exec;
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates};
@@ -81,6 +82,10 @@ impl<L> Elasticity<L> {
         let (weights, whole, kernel) = (&self.operator.weights, BondStates::whole(body), UnitStrain(self.law));
         let output = shares.each_mut().map(|share| &mut share[..]);
         Exec::default().sum_bonds::<D, 0, 4, Double>(body, weights, &whole, [], output, &kernel);
+        if let Some(solid) = &self.state_based {
+            self.shares_of_solid(&solid.moduli, body, scaling, &mut shares);
+            return shares;
+        }
         let complete = |size, horizon| {
             let mut sum = [0.0; 4];
             scaling.complete::<D>(size, horizon, |bond, _| sum = kernel.add(bond, &[], 0.0, sum));
@@ -106,6 +111,53 @@ impl<L> Elasticity<L> {
             }
         }
         shares
+    }
+}
+
+impl<L> Elasticity<L> {
+    /// From the sums of the energies of bonds to shares, of a body whose points have a weighted volume of their own. Unit
+    /// strain in all directions has the energy of a complete family everywhere.
+    fn shares_of_solid<const D: usize>(&self, moduli: &Moduli, body: &Body<D>, scaling: &Scaling, shares: &mut Shares)
+    where
+        L: BondLaw<D>,
+    {
+        let mut squares: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; body.cloud.n_slots()]);
+        let (weights, whole, kernel) = (&self.operator.weights, BondStates::whole(body), Squares(self.law));
+        let output = squares.each_mut().map(|sum| &mut sum[..]);
+        Exec::default().sum_bonds::<D, 0, 3, Double>(body, weights, &whole, [], output, &kernel);
+        let (mut energies, mut sums) = ([0.0; 4], [0.0; 3]);
+        scaling.complete::<D>(body.cloud.spacing, body.horizon, |bond, _| {
+            energies = UnitStrain(self.law).add(bond, &[], 0.0, energies);
+            sums = kernel.add(bond, &[], 0.0, sums);
+        });
+        let [axes @ .., moments] = shares;
+        for d in 0..D {
+            let complete = moduli.energy(energies[3], sums[d], energies[d]);
+            for (slot, share) in axes[d].iter_mut().enumerate().filter(|(slot, _)| moments[*slot] > 0.0) {
+                *share = moduli.energy(moments[slot], squares[d][slot], *share) / complete;
+            }
+        }
+        moments.iter_mut().for_each(|moment| *moment = if *moment > 0.0 { 1.0 } else { 0.0 });
+    }
+}
+
+/// Σ k ξ_d²
+struct Squares<L>(L);
+
+impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 3> for Squares<B> {
+    const RELATIVE: bool = false;
+
+    #[inline(always)]
+    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
+        L::splat(0.0)
+    }
+    #[inline(always)]
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; 3]) -> [L; 3] {
+        let spring = self.0.tangent(bond.length, bond.weight);
+        for d in 0..D {
+            sum[d] = (bond.xi[d] * bond.xi[d]).mul_add(spring, sum[d]);
+        }
+        sum
     }
 }
 

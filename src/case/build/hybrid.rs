@@ -1,0 +1,104 @@
+//! Which points of a case have rows, and the row.
+
+use super::super::model;
+use super::Builder;
+use crate::discretization::collocation::SharedRow;
+use crate::discretization::collocation::gate::{Law, bearable_in_motion};
+use crate::discretization::moments::ball_moment;
+use crate::discretization::{BondWeights, Collocation, Regions, Scaling};
+use crate::error::{Error, Result};
+use crate::execution::{Limits, Packs};
+use crate::family::{Body, BondLaw, Families};
+use crate::geometry::Arrangement;
+use crate::physics::Elasticity;
+use crate::physics::elasticity::State;
+use crate::physics::failure::CriticalStretch;
+use crate::problem::Hybrid;
+
+const PATH: &str = "discretization.scheme.hybrid";
+
+impl<const D: usize> Builder<'_, D> {
+    /// `unit`: δ/√(E/ρ), s.
+    pub(super) fn hybrid<L: BondLaw<D>, P: Packs>(
+        &self,
+        settings: &model::Hybrid,
+        body: &Body<D>,
+        physics: &Elasticity<L>,
+        state: &State<P>,
+        scaling: &Scaling,
+        unit: f64,
+    ) -> Result<Hybrid<D, P>> {
+        let Arrangement::Lattice(lattice) = &body.cloud.arrangement else {
+            return Err(self.refuse(PATH, "the hybrid scheme is for lattices", ""));
+        };
+        let points = settings.points.unwrap_or_else(|| Collocation::fewest::<D>(settings.order));
+        let collocation = Collocation { order: settings.order, points, exponent: settings.exponent };
+        let refuse = |error: Error| self.refuse(PATH, error.to_string(), "");
+        let kernel = Law::Elastic { influence: scaling.influence, micromodulus: scaling.strength };
+        // Noise may grow tenfold in the run.
+        let end_time = self.case.value.solver.stages().map(|(_, solver)| solver.end_time()).fold(0.0, f64::max);
+        let bearable = bearable_in_motion(end_time, physics.density);
+        let (fit, symbol) = collocation
+            .marched::<D>(lattice.spacing, scaling.horizon, &kernel, bearable)
+            .map_err(|error| self.refuse(PATH, error.to_string(), "leave out `order`, `points` and `exponent`"))?;
+        let weights = fit.elastic(&scaling.influence, scaling.strength);
+        let row = SharedRow::new(lattice, &fit, &weights).map_err(refuse)?;
+        let standard = self.standard_from_the_start(settings, body)?;
+        let regions = Regions::new(body, &state.states, standard, settings.buffer);
+        if regions.collocated_points() == 0 {
+            let message = "every point is near a boundary, a pre-crack or a named set: all sum their bonds";
+            log::warn!("{}", self.source().warning(PATH, message));
+        }
+        let smallest = physics.failure.as_ref().map_or(f64::INFINITY, CriticalStretch::smallest);
+        let at = if settings.adaptive { settings.switch_at * smallest } else { smallest };
+        let linear = L::LINEAR;
+        let limits = Limits {
+            // The measure of both laws: ½ (|y|²/|ξ|² − 1), or s.
+            strain: if linear { at } else { at + 0.5 * at * at },
+            linear,
+            gradient: if linear { f64::INFINITY } else { settings.largest_gradient },
+        };
+        let mut hybrid = Hybrid::new(regions, row, symbol.radius, limits);
+        hybrid.damping = settings.damping * unit;
+        (hybrid.damps_bonds, hybrid.adaptive) = (settings.damp_bonds, settings.adaptive);
+        Ok(hybrid)
+    }
+
+    /// Slots of the sets that are named, of no-fail sets, and of what is prescribed or loaded on its surface.
+    fn standard_from_the_start(&self, settings: &model::Hybrid, body: &Body<D>) -> Result<impl Iterator<Item = u32>> {
+        let case = &self.case.value;
+        let mut names: Vec<(&String, String)> = Vec::new();
+        for (k, name) in settings.standard.iter().enumerate() {
+            names.push((name, format!("{PATH}.standard[{k}]")));
+        }
+        if let Some(model::Failure::CriticalStretch(failure)) = &case.physics.elasticity.failure {
+            for (k, name) in failure.no_fail.iter().enumerate() {
+                names.push((name, format!("physics.elasticity.failure.critical_stretch.no_fail[{k}]")));
+            }
+        }
+        for (k, condition) in case.conditions.iter().enumerate() {
+            // A body force may act on all of the body.
+            let surface = matches!(condition.load, Some(model::Load::Traction { .. } | model::Load::Pressure { .. }));
+            if surface || condition.prescribe.is_some() {
+                names.push((&condition.on, format!("conditions[{k}].on")));
+            }
+        }
+        let mut sets = Vec::new();
+        for (name, path) in names {
+            sets.push(self.slots(name, &body.cloud, &path)?);
+        }
+        Ok(sets.into_iter().flat_map(|slots| slots.to_vec()))
+    }
+}
+
+/// Scales the weights of a lattice so that Σ w |ξ| is the integral ∫ c ω |ξ| dV, to which the energy of expansion and the mean
+/// stiffness over all directions are proportional.
+pub(super) fn rescale<const D: usize, L>(physics: &mut Elasticity<L>, body: &Body<D>, scaling: &Scaling) {
+    let (Families::Lattice(families), BondWeights::Lattice(weights)) = (&body.families, &mut physics.operator.weights)
+    else {
+        return;
+    };
+    let sum: f64 = families.offsets.iter().zip(&*weights).map(|(offset, weight)| weight * offset.length).sum();
+    let integral = scaling.strength * ball_moment(&scaling.influence, [0; D], -1.0, scaling.horizon);
+    weights.iter_mut().for_each(|weight| *weight *= integral / sum);
+}

@@ -1,0 +1,343 @@
+//! Rows of collocation on lattices: a vector of consecutive points, all with the same short row.
+//!
+//! Beside the force, the displacements at the nearest points tell how far the family is strained, without a look at its
+//! bonds.
+
+use rayon::prelude::*;
+
+use super::packs::{Ends, Instructions, Pack, Packs};
+use super::{Exec, SharedSlice};
+use crate::discretization::Regions;
+use crate::discretization::collocation::{Pair, SharedRow};
+use crate::family::{Body, Class};
+use crate::field::Number;
+use crate::geometry::lattice::BLOCK;
+use crate::geometry::{Arrangement, Lattice};
+
+/// How far a point with a row may be strained.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Largest strain: of E = ½(∇u + ∇uᵀ + ∇uᵀ∇u), or without the last term if `linear`.
+    pub strain: f64,
+    pub linear: bool,
+    /// Largest |∇u| (Frobenius).
+    pub gradient: f64,
+}
+
+impl Limits {
+    /// Nothing is too far.
+    pub const NONE: Limits = Limits { strain: f64::INFINITY, linear: true, gradient: f64::INFINITY };
+}
+
+/// Blocks in a chunk.
+const CHUNK: usize = 64;
+
+/// Rows over the blocks of a lattice.
+struct Sum<'a, const D: usize, P: Packs> {
+    instructions: Instructions,
+    lattice: &'a Lattice<D>,
+    regions: &'a Regions,
+    pairs: Vec<BondPair<D, P::Bond>>,
+    classes: &'a [Class],
+    input: [&'a [P::Field]; D],
+    output: &'a [SharedSlice<P::Field>],
+    /// 1/limits, 1/Δx, and what the products of gradients count.
+    strain: P::Bond,
+    gradient: P::Bond,
+    inverse_spacing: P::Bond,
+    products: P::Bond,
+}
+
+/// A pair in the numbers of the bond arithmetic.
+struct BondPair<const D: usize, B> {
+    shift: isize,
+    weight: [[B; D]; D],
+}
+
+impl Exec {
+    /// output(x) = (L input)(x) at the points of `blocks` that have a row; other slots are left alone. Gives the slots of those
+    /// where `limits` are passed, ascending within each block.
+    ///
+    /// How far a family is strained is judged by E from the differences to the nearest points: its normal strains are the
+    /// larger of those on either side, so that the bonds to these points count exactly, its shear strains central. What is
+    /// compared is tr E/D + √((D − 1)/D) |dev E|, in 1D and 2D the largest principal strain, in 3D a bound of it. The nearest
+    /// points are asked, and not the row, because a row with a node at every second point does not see waves of four
+    /// spacings.
+    ///
+    /// # Panics
+    /// If the body is no lattice.
+    #[allow(clippy::too_many_arguments)] // the row, where, its data and limits: nothing that belongs in one struct
+    pub fn collocate<const D: usize, P: Packs>(
+        &mut self,
+        body: &Body<D>,
+        row: &SharedRow<D>,
+        regions: &Regions,
+        blocks: &[u32],
+        input: [&[P::Field]; D],
+        output: [&mut [P::Field]; D],
+        limits: &Limits,
+    ) -> Vec<u32> {
+        let output = self.shared(body, &input, output);
+        let sum = Sum::<D, P>::new(self.instructions, body, row, regions, input, &output, limits);
+        let chunks = blocks.par_chunks(CHUNK).map(|blocks| {
+            let mut beyond = Vec::new();
+            for &block in blocks {
+                let slot = sum.lattice.guard + block as usize * BLOCK;
+                // SAFETY: the slots of a block belong to its chunk alone, and what its row reaches lies between the guards:
+                // `shared` and `SharedRow::new` have seen to it.
+                let bits = unsafe { sum.force(slot) };
+                beyond.extend((0..BLOCK).filter(|k| bits >> k & 1 == 1).map(|k| (slot + k) as u32));
+            }
+            beyond
+        });
+        chunks.collect::<Vec<_>>().concat()
+    }
+
+    /// density(x) = ¼ Σ_j (u_j − u)·K_j (u_j − u), J/m³, at the points that have a row: −½ Σ u·L u V where all points have
+    /// the same row, which is what their motion keeps.
+    pub fn row_energy<const D: usize, P: Packs>(
+        &mut self,
+        body: &Body<D>,
+        row: &SharedRow<D>,
+        regions: &Regions,
+        input: [&[P::Field]; D],
+        density: &mut [P::Field],
+    ) {
+        let output = self.shared(body, &input, [density]);
+        let sum = Sum::<D, P>::new(self.instructions, body, row, regions, input, &output, &Limits::NONE);
+        regions.collocated.par_chunks(CHUNK).for_each(|blocks| {
+            for &block in blocks {
+                // SAFETY: as above.
+                unsafe { sum.energy(sum.lattice.guard + block as usize * BLOCK) };
+            }
+        });
+    }
+
+    fn shared<const D: usize, const O: usize, T: Number>(
+        &self,
+        body: &Body<D>,
+        input: &[&[T]; D],
+        output: [&mut [T]; O],
+    ) -> [SharedSlice<T>; O] {
+        let n = body.cloud.n_slots();
+        assert!(input.iter().all(|f| f.len() == n), "input fields have the length of the cloud");
+        assert!(output.iter().all(|f| f.len() == n), "output fields have the length of the cloud");
+        output.map(|f| SharedSlice(f.as_mut_ptr()))
+    }
+}
+
+impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
+    fn new(
+        instructions: Instructions,
+        body: &'a Body<D>,
+        row: &'a SharedRow<D>,
+        regions: &'a Regions,
+        input: [&'a [P::Field]; D],
+        output: &'a [SharedSlice<P::Field>],
+        limits: &Limits,
+    ) -> Self {
+        let Arrangement::Lattice(lattice) = &body.cloud.arrangement else { panic!("shared rows are of lattices") };
+        let pair =
+            |pair: &Pair<D>| BondPair { shift: pair.shift, weight: pair.weight.map(|w| w.map(P::Bond::from_f64)) };
+        Sum {
+            instructions,
+            lattice,
+            regions,
+            pairs: row.pairs.iter().map(pair).collect(),
+            classes: &row.classes,
+            input,
+            output,
+            strain: P::Bond::from_f64(1.0 / limits.strain),
+            gradient: P::Bond::from_f64(limits.gradient.powi(-2)),
+            inverse_spacing: P::Bond::from_f64(1.0 / lattice.spacing),
+            products: P::Bond::from_f64(if limits.linear { 0.0 } else { 1.0 }),
+        }
+    }
+
+    compiled!(force, force_on, force_avx2, force_avx512, [], (slot: usize), u16);
+    compiled!(energy, energy_on, energy_avx2, energy_avx512, [], (slot: usize), ());
+
+    /// The row at the points of one block; gives the bits of those that are strained too far.
+    #[inline(always)]
+    unsafe fn force_on<V: Pack<P::Bond> + Ends<P::Field>>(&self, slot: usize) -> u16 {
+        let keep = self.regions.rows(slot);
+        let mut beyond = 0;
+        for part in 0..BLOCK / V::LANES {
+            let first = slot + part * V::LANES;
+            let mask = keep >> (part * V::LANES);
+            // SAFETY: the slots of a block, and those that its rows reach, are inside the input.
+            unsafe {
+                let here = self.hold::<V>(first);
+                let mut twice = [V::NOTHING; D];
+                for i in 0..D {
+                    twice[i] = V::twice(here[i]);
+                }
+                let mut total = [V::splat(0.0); D];
+                let mut waiting = [[V::splat(0.0); D]; 3];
+                let mut pairs = self.pairs.iter();
+                for class in self.classes {
+                    for sequence in 0..1 << (class.axes - 1) {
+                        let mut sum = [V::splat(0.0); D];
+                        for pair in pairs.by_ref().take(class.members as usize) {
+                            let mut bend = [V::splat(0.0); D];
+                            for i in 0..D {
+                                let [after, before] = self.ends::<V>(i, first, pair.shift);
+                                bend[i] = V::bend(after, before, twice[i]);
+                            }
+                            for o in 0..D {
+                                for i in 0..D {
+                                    sum[o] = V::broadcast(pair.weight[o][i]).mul_add(bend[i], sum[o]);
+                                }
+                            }
+                        }
+                        let mut level = 0;
+                        while sequence >> level & 1 == 1 {
+                            sum = super::lattice::add(waiting[level], sum);
+                            level += 1;
+                        }
+                        waiting[level] = sum;
+                    }
+                    total = super::lattice::add(total, waiting[class.axes as usize - 1]);
+                }
+                for strained in self.strained::<V>(first, &here) {
+                    let strained = strained.keep(mask);
+                    if strained.largest() > 0.0 {
+                        for lane in 0..V::LANES {
+                            if strained.lane(lane) > 0.0 {
+                                beyond |= 1 << (part * V::LANES + lane);
+                            }
+                        }
+                    }
+                }
+                for o in 0..D {
+                    self.store(total[o], o, first, mask);
+                }
+            }
+        }
+        beyond
+    }
+
+    /// How far the nearest points are strained, and how large the gradient is: positive where that is more than is allowed.
+    #[inline(always)]
+    unsafe fn strained<V: Pack<P::Bond> + Ends<P::Field>>(&self, first: usize, here: &[V::Held; D]) -> [V; 2] {
+        let half = V::splat(0.5);
+        let (zero, per, products) = (V::splat(0.0), V::broadcast(self.inverse_spacing), V::broadcast(self.products));
+        // ∂u_i/∂x_d ahead of and behind the point.
+        let (mut ahead, mut behind) = ([[zero; D]; D], [[zero; D]; D]);
+        for d in 0..D {
+            for i in 0..D {
+                // SAFETY: as of the row, which reaches at least as far.
+                let [after, before] = unsafe { self.ends::<V>(i, first, self.lattice.strides[d] as isize) };
+                ahead[i][d] = V::relative(after, here[i], u16::MAX) * per;
+                behind[i][d] = V::relative(here[i], before, u16::MAX) * per;
+            }
+        }
+        let mut gradient = [[zero; D]; D];
+        let mut size = zero;
+        for i in 0..D {
+            for d in 0..D {
+                gradient[i][d] = half * (ahead[i][d] + behind[i][d]);
+                size = gradient[i][d].mul_add(gradient[i][d], size);
+            }
+        }
+        let (mut normal, mut mean, mut shear) = ([zero; D], zero, zero);
+        for a in 0..D {
+            let (mut before, mut after) = (behind[a][a], ahead[a][a]);
+            for i in 0..D {
+                let share = half * products;
+                before = (share * behind[i][a]).mul_add(behind[i][a], before);
+                after = (share * ahead[i][a]).mul_add(ahead[i][a], after);
+            }
+            // The larger of both.
+            normal[a] = half * ((before + after) + zero.larger(after - before));
+            mean = mean + normal[a];
+            for b in 0..a {
+                let mut twice = gradient[a][b] + gradient[b][a];
+                for i in 0..D {
+                    twice = (products * gradient[i][a]).mul_add(gradient[i][b], twice);
+                }
+                shear = (half * twice).mul_add(twice, shear);
+            }
+        }
+        mean = mean * V::splat(1.0 / D as f64);
+        let mut deviation = shear;
+        for a in 0..D {
+            let part = normal[a] - mean;
+            deviation = part.mul_add(part, deviation);
+        }
+        // mean + root > limit without the root: root² > (limit − mean) |limit − mean|, over limit².
+        let one = V::splat(1.0);
+        let per_limit = V::broadcast(self.strain);
+        let root = V::splat((D as f64 - 1.0) / D as f64) * deviation * per_limit * per_limit;
+        let left = one - mean * per_limit;
+        [root - left * zero.larger(left), size * V::broadcast(self.gradient) - one]
+    }
+
+    /// The row's energy at the points of one block.
+    #[inline(always)]
+    unsafe fn energy_on<V: Pack<P::Bond> + Ends<P::Field>>(&self, slot: usize) {
+        let keep = self.regions.rows(slot);
+        for part in 0..BLOCK / V::LANES {
+            let first = slot + part * V::LANES;
+            // SAFETY: as of `force_on`.
+            unsafe {
+                let here = self.hold::<V>(first);
+                let mut sum = V::splat(0.0);
+                for pair in &self.pairs {
+                    let (mut after, mut before) = ([V::splat(0.0); D], [V::splat(0.0); D]);
+                    for i in 0..D {
+                        let ends = self.ends::<V>(i, first, pair.shift);
+                        after[i] = V::relative(ends[0], here[i], u16::MAX);
+                        before[i] = V::relative(ends[1], here[i], u16::MAX);
+                    }
+                    for o in 0..D {
+                        let (mut there, mut back) = (V::splat(0.0), V::splat(0.0));
+                        for i in 0..D {
+                            let weight = V::broadcast(pair.weight[o][i]);
+                            there = weight.mul_add(after[i], there);
+                            back = weight.mul_add(before[i], back);
+                        }
+                        sum = sum + (after[o] * there + before[o] * back);
+                    }
+                }
+                self.store(V::splat(0.25) * sum, 0, first, keep >> (part * V::LANES));
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn hold<V: Ends<P::Field>>(&self, first: usize) -> [V::Held; D] {
+        let mut held = [V::NOTHING; D];
+        for i in 0..D {
+            held[i] = unsafe { V::hold(self.input[i].as_ptr().add(first)) };
+        }
+        held
+    }
+
+    /// Values `shift` slots ahead and behind.
+    #[inline(always)]
+    unsafe fn ends<V: Ends<P::Field>>(&self, component: usize, first: usize, shift: isize) -> [V::Held; 2] {
+        unsafe {
+            let here = self.input[component].as_ptr().add(first);
+            [V::hold(here.offset(shift)), V::hold(here.offset(-shift))]
+        }
+    }
+
+    /// Writes the lanes whose bit is set.
+    #[inline(always)]
+    unsafe fn store<V: Pack<P::Bond> + Ends<P::Field>>(&self, value: V, component: usize, first: usize, mask: u16) {
+        let all = u16::MAX >> (BLOCK - V::LANES);
+        // SAFETY: the slots of a block are inside the output.
+        unsafe {
+            let target = self.output[component].0.add(first);
+            if mask & all == all {
+                return value.store(target);
+            }
+            let mut values = [P::Field::default(); BLOCK];
+            value.store(values.as_mut_ptr());
+            for lane in (0..V::LANES).filter(|lane| mask >> lane & 1 == 1) {
+                *target.add(lane) = values[lane];
+            }
+        }
+    }
+}

@@ -1,0 +1,332 @@
+//! Rows where matter is whole, bonds where it breaks, and the switch between them at run time.
+//!
+//! Shojaei et al. 2022, section 4. In each evaluation rows are summed first and say where a family is strained beyond a
+//! share of the critical stretch, (65); these points and their families sum their bonds from this evaluation on. Bonds that
+//! are about to break and end at a point with a row do not, but make both families switch, and the bonds are summed again:
+//! no bond that a point of the standard region sees passes its critical stretch unbroken. The families of broken bonds
+//! switch too, so that no row reaches across a crack.
+//!
+//! Rows and bonds together are no symmetric operator, and their motion grows. All forces are therefore those of u + τ v, which
+//! damps a wave in proportion to its frequency squared and takes next to nothing from those that are long beside the horizon.
+
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use super::Problem;
+use crate::conditions::Prescribed;
+use crate::discretization::Regions;
+use crate::discretization::collocation::SharedRow;
+use crate::execution::{Exec, Limits, Packs};
+use crate::family::{Body, BondLaw, Families};
+use crate::field::{Number, Precision, components, components_mut};
+use crate::physics::elasticity::{Edge, Elasticity, Overstretched, State};
+
+/// Numbers that a thread updates at a time.
+const CHUNK: usize = 16 * 1024;
+
+/// Evaluations between two looks at the power of the damping.
+const LOOKS: u64 = 20;
+
+/// Which points have rows, the row, and when points switch.
+pub struct Hybrid<const D: usize, P: Precision> {
+    pub regions: Regions,
+    pub row: SharedRow<D>,
+    /// Largest |eigenvalue| of the row on an infinite lattice, N/m⁴ (3D).
+    pub radius: f64,
+    /// τ, s
+    pub damping: f64,
+    /// Whether bonds are damped too, or rows alone.
+    pub damps_bonds: bool,
+    /// Beyond these, points switch; or warn, once, where the regions are fixed.
+    pub limits: Limits,
+    pub adaptive: bool,
+    /// u + τ v, and whether it is that of the displacements and velocities as they are.
+    ahead: Vec<P::Field>,
+    is_ahead: bool,
+    warned: bool,
+    /// Of the damping at the last look, W.
+    power: f64,
+    pub work: Work,
+}
+
+/// What the hybrid scheme has to do.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Work {
+    /// Fraction of the points that sum their bonds: now and at the start.
+    pub standard: [f64; 2],
+    /// In the last evaluation: bonds, and points of rows, that were visited.
+    pub bonds: u64,
+    pub nodes: u64,
+    /// The same of all evaluations.
+    pub all_bonds: u64,
+    pub all_nodes: u64,
+}
+
+impl<const D: usize, P: Packs> Hybrid<D, P> {
+    /// `radius` in N/m⁴ (3D).
+    pub fn new(regions: Regions, row: SharedRow<D>, radius: f64, limits: Limits) -> Self {
+        Hybrid {
+            regions,
+            row,
+            radius,
+            damping: 0.0,
+            damps_bonds: true,
+            limits,
+            adaptive: true,
+            ahead: Vec::new(),
+            is_ahead: false,
+            warned: false,
+            power: 0.0,
+            work: Work::default(),
+        }
+    }
+
+    /// Largest stable step of velocity Verlet, s, where that of the bonds is `bonds`: Δt = √(τ² + 4/ω²) − τ, for rows with
+    /// ω² = Λ/ρ.
+    ///
+    /// With u(n+1) = u(n) + Δt v(n+½) and v(n+3/2) = v(n+½) − Δt ω² (u(n+1) + τ v(n+½)) the larger root leaves the unit circle
+    /// where ω² Δt² + 2 ω² τ Δt = 4.
+    pub fn stable_step(&self, density: f64, bonds: f64) -> f64 {
+        let damped = |square: f64| (self.damping.powi(2) + square).sqrt() - self.damping;
+        let rows = damped(4.0 * density / self.radius);
+        rows.min(if self.damps_bonds { damped(bonds * bonds) } else { bonds })
+    }
+
+    /// As [`Elasticity::evaluate`].
+    fn evaluate<L: BondLaw<D>>(
+        &mut self,
+        physics: &Elasticity<L>,
+        body: &Body<D>,
+        exec: &mut Exec,
+        state: &mut State<P>,
+        dt: f64,
+    ) {
+        self.look_ahead(&state.displacement, &state.velocity);
+        let strained = self.sum(body, exec, false, state);
+        if self.adaptive {
+            self.switch(body, exec, &strained);
+        } else if !strained.is_empty() {
+            self.warn(body, strained[0] as usize);
+        }
+        loop {
+            let edge = Edge { regions: &self.regions, overstretched: Mutex::default() };
+            let tau = if self.damps_bonds { self.damping } else { 0.0 };
+            Self::at(&mut self.ahead, tau, state, |state| {
+                // So that what a bond holds is that of the displacements before the step.
+                let since = if dt > 0.0 { dt + tau } else { 0.0 };
+                physics.evaluate(body, exec, state, since, Some(&edge));
+            });
+            let list = edge.overstretched.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let Overstretched { broken, held } = list;
+            if !self.adaptive {
+                if let Some(&slot) = held.iter().min() {
+                    self.warn(body, slot as usize);
+                }
+                break;
+            }
+            let mut ends = [broken, held.clone()].concat();
+            ends.sort_unstable();
+            ends.dedup();
+            self.switch(body, exec, &ends);
+            if held.is_empty() {
+                break;
+            }
+        }
+        self.sum(body, exec, true, state);
+        self.count(body);
+    }
+
+    /// As [`Elasticity::force_density`]; nothing switches.
+    fn force_density<L: BondLaw<D>>(
+        &mut self,
+        physics: &Elasticity<L>,
+        body: &Body<D>,
+        exec: &mut Exec,
+        state: &mut State<P>,
+    ) {
+        self.look_ahead(&state.displacement, &state.velocity);
+        self.sum(body, exec, false, state);
+        let tau = if self.damps_bonds { self.damping } else { 0.0 };
+        Self::at(&mut self.ahead, tau, state, |State { displacement, force, states, .. }| {
+            let (input, output) = (components::<D, _>(displacement), components_mut::<D, _>(force));
+            physics.force_density::<D, P>(body, exec, states, input, output);
+        });
+        self.sum(body, exec, true, state);
+        self.count(body);
+    }
+
+    /// Does something with u + τ v in the place of the displacements.
+    fn at(ahead: &mut Vec<P::Field>, tau: f64, state: &mut State<P>, mut work: impl FnMut(&mut State<P>)) {
+        if tau == 0.0 {
+            return work(state);
+        }
+        std::mem::swap(ahead, &mut state.displacement);
+        work(state);
+        std::mem::swap(ahead, &mut state.displacement);
+    }
+
+    /// τ and where a solver that drifts may put u + τ v in passing.
+    pub(super) fn ahead(&mut self) -> Option<(f64, &mut [P::Field])> {
+        (self.damping > 0.0 && !self.ahead.is_empty()).then_some((self.damping, &mut self.ahead[..]))
+    }
+
+    /// A solver has drifted, and prescribed values have been set behind it.
+    pub(super) fn drifted(&mut self, prescribed: &[Prescribed], state: &State<P>) {
+        let tau = P::Field::from_f64(self.damping);
+        let Some((_, ahead)) = self.ahead() else { return };
+        for p in prescribed {
+            let [u, v] = [&state.displacement, &state.velocity].map(|flat| components::<D, _>(flat)[p.component]);
+            let ahead = &mut *components_mut::<D, _>(ahead)[p.component];
+            for &slot in p.slots.iter() {
+                ahead[slot as usize] = u[slot as usize] + tau * v[slot as usize];
+            }
+        }
+        self.is_ahead = true;
+    }
+
+    /// u + τ v
+    fn look_ahead(&mut self, displacement: &[P::Field], velocity: &[P::Field]) {
+        if self.damping == 0.0 || std::mem::take(&mut self.is_ahead) {
+            return;
+        }
+        self.ahead.resize(displacement.len(), P::Field::default());
+        let tau = P::Field::from_f64(self.damping);
+        let ahead = self.ahead.par_chunks_mut(CHUNK);
+        ahead.zip(displacement.par_chunks(CHUNK)).zip(velocity.par_chunks(CHUNK)).for_each(|((ahead, u), v)| {
+            for ((ahead, u), v) in ahead.iter_mut().zip(u).zip(v) {
+                *ahead = *u + tau * *v;
+            }
+        });
+    }
+
+    /// Applies the rows everywhere, or in the blocks that the sums over bonds have written to.
+    fn sum(&self, body: &Body<D>, exec: &mut Exec, mixed: bool, state: &mut State<P>) -> Vec<u32> {
+        let blocks = if mixed { &self.regions.mixed } else { &self.regions.collocated };
+        let input = if self.damping == 0.0 { &state.displacement } else { &self.ahead };
+        let (input, output) = (components::<D, _>(input), components_mut::<D, _>(&mut state.force));
+        exec.collocate::<D, P>(body, &self.row, &self.regions, blocks, input, output, &self.limits)
+    }
+
+    fn switch(&mut self, body: &Body<D>, exec: &mut Exec, slots: &[u32]) {
+        if self.regions.switch(body, slots) > 0 {
+            exec.within(&self.regions.standard);
+        }
+    }
+
+    fn warn(&mut self, body: &Body<D>, slot: usize) {
+        if !std::mem::replace(&mut self.warned, true) {
+            let x = body.cloud.position(slot);
+            log::warn!(
+                "the body is strained beyond what collocation is for, first at {x:?}: bonds do not break there; name the \
+                 place in `standard`, or let the regions be `adaptive`"
+            );
+        }
+    }
+
+    fn count(&mut self, body: &Body<D>) {
+        let Families::Lattice(families) = &body.families else { return };
+        let [standard, rows] = [self.regions.standard_points(), self.regions.collocated_points()];
+        let work = &mut self.work;
+        work.standard[0] = standard as f64 / (standard + rows) as f64;
+        (work.bonds, work.nodes) = ((standard * families.offsets.len()) as u64, (rows * self.row.n_nodes()) as u64);
+        work.all_bonds += work.bonds;
+        work.all_nodes += work.nodes;
+    }
+
+    fn memory(&self) -> usize {
+        self.regions.memory() + size_of_val(&self.ahead[..])
+    }
+}
+
+impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
+    /// From here on points have rows as `hybrid` says. Before the start.
+    pub fn hybridise(&mut self, mut hybrid: Hybrid<D, P>) {
+        self.exec.within(&hybrid.regions.standard);
+        hybrid.count(&self.body);
+        hybrid.work = Work { standard: [hybrid.work.standard[0]; 2], ..Work::default() };
+        self.hybrid = Some(Box::new(hybrid));
+    }
+
+    /// What the hybrid scheme has to do; None in the standard scheme.
+    pub fn hybrid(&self) -> Option<Work> {
+        self.hybrid.as_ref().map(|hybrid| hybrid.work)
+    }
+
+    /// Bonds that overstretch break, and the internal force density is that of the displacements.
+    pub(super) fn evaluate_bonds(&mut self, dt: f64) {
+        let Problem { body, physics, state, exec, hybrid, .. } = self;
+        match hybrid {
+            Some(hybrid) => hybrid.evaluate(physics, body, exec, state, dt),
+            None => physics.evaluate(body, exec, state, dt, None),
+        }
+    }
+
+    /// The internal force density, without anything breaking.
+    pub(super) fn force_of_bonds(&mut self) {
+        let Problem { body, physics, state, exec, hybrid, .. } = self;
+        if let Some(hybrid) = hybrid {
+            return hybrid.force_density(physics, body, exec, state);
+        }
+        let State { displacement, force, states, .. } = state;
+        let (input, output) = (components::<D, _>(displacement), components_mut::<D, _>(force));
+        physics.force_density::<D, P>(body, exec, states, input, output);
+    }
+
+    /// W by slot, J/m³.
+    pub(super) fn strain_energy(&mut self) -> Vec<P::Field> {
+        let mut density = vec![P::Field::default(); self.body.cloud.n_slots()];
+        self.physics.strain_energy_density(&self.body, &mut self.exec, &self.state, &mut density);
+        if let Some(hybrid) = &self.hybrid {
+            let input = components::<D, _>(&self.state.displacement);
+            self.exec.row_energy::<D, P>(&self.body, &hybrid.row, &hybrid.regions, input, &mut density);
+        }
+        density
+    }
+
+    /// What damping takes, W: −τ Σ v·L v V = 2 Σ W(τ v) V/τ.
+    fn power_of_damping(&mut self) -> f64 {
+        let Some(hybrid) = &mut self.hybrid else { return 0.0 };
+        let tau = P::Field::from_f64(hybrid.damping);
+        let velocity = &self.state.velocity;
+        hybrid.ahead.par_chunks_mut(CHUNK).zip(velocity.par_chunks(CHUNK)).for_each(|(ahead, v)| {
+            ahead.iter_mut().zip(v).for_each(|(ahead, v)| *ahead = tau * *v);
+        });
+        std::mem::swap(&mut hybrid.ahead, &mut self.state.displacement);
+        let density = self.strain_energy();
+        let cloud = &self.body.cloud;
+        let hybrid = self.hybrid.as_mut().expect("it was there above");
+        let (regions, all) = (&hybrid.regions, hybrid.damps_bonds);
+        let [energy, ..] = self.exec.sum(density.len(), &|slots| {
+            let counts = |slot: &usize| all || regions.has_row(*slot);
+            [slots.filter(counts).map(|slot| density[slot].to_f64()).sum(), 0.0, 0.0, 0.0]
+        });
+        std::mem::swap(&mut hybrid.ahead, &mut self.state.displacement);
+        2.0 * energy * cloud.spacing.powi(D as i32) / hybrid.damping
+    }
+
+    /// Books what the damping has taken since the last look, every so many steps; `first` opens the books.
+    pub(super) fn book_stiffness_damping(&mut self, step: u64, dt: f64, first: bool) {
+        let due = first || step.is_multiple_of(LOOKS);
+        if !due || self.hybrid.as_ref().is_none_or(|hybrid| hybrid.damping == 0.0) {
+            return;
+        }
+        let power = self.power_of_damping();
+        let hybrid = self.hybrid.as_mut().expect("it is damped");
+        if !first {
+            // Trapezoidal in time.
+            self.ledger.damped += 0.5 * (hybrid.power + power) * LOOKS as f64 * dt;
+        }
+        hybrid.power = power;
+    }
+
+    /// Where points sum their bonds, by slot: 1, and 0 where they have a row.
+    pub(super) fn scheme(&self, slot: usize) -> f64 {
+        let row = self.hybrid.as_ref().is_some_and(|hybrid| hybrid.regions.has_row(slot));
+        if row { 0.0 } else { 1.0 }
+    }
+
+    pub(super) fn memory_of_hybrid(&self) -> usize {
+        self.hybrid.as_ref().map_or(0, |hybrid| hybrid.memory())
+    }
+}
