@@ -1,7 +1,7 @@
 //! Proof: studies that compare the program with closed forms and published figures, each in one file.
 //!
 //! A study prints what is published or exact beside what was obtained, the difference, the tolerance and where the
-//! tolerance comes from, and plots itself. `bondwise verify` runs them; tests assert that they pass.
+//! tolerance comes from, and plots itself. `bondwise verify` runs them, and so does the gate; tests assert that the quickest pass.
 
 pub mod bar;
 mod constants;
