@@ -232,15 +232,24 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             Solver::Statics(statics) => return self.settle(statics, clock, observe),
             Solver::VelocityVerlet(verlet) => {
                 self.damping = verlet.damping;
-                verlet.step(self, clock);
-                let (kinetic, momentum) = self.motion();
+                let squares = verlet.step(self, clock);
                 let ledger = &mut self.ledger;
-                // Damping takes ρ c v² a second, and ρ c v of momentum: trapezoidal in time, as the forces.
-                ledger.damped += verlet.damping * clock.dt * (ledger.kinetic + kinetic);
-                for d in 0..3 {
-                    ledger.impulse[d] -= 0.5 * verlet.damping * clock.dt * (ledger.momentum[d] + momentum[d]);
+                match &self.body.cloud.arrangement {
+                    Arrangement::Lattice(lattice) if verlet.damping == 0.0 && self.prescribed.is_empty() => {
+                        ledger.kinetic = 0.5 * self.physics.density * lattice.cell_volume() * squares;
+                    }
+                    _ => {
+                        let last = (ledger.kinetic, ledger.momentum);
+                        let (kinetic, momentum) = self.motion();
+                        let ledger = &mut self.ledger;
+                        // Damping takes ρ c v² a second, and ρ c v of momentum: trapezoidal in time, as the forces.
+                        ledger.damped += verlet.damping * clock.dt * (last.0 + kinetic);
+                        for d in 0..3 {
+                            ledger.impulse[d] -= 0.5 * verlet.damping * clock.dt * (last.1[d] + momentum[d]);
+                        }
+                        (ledger.kinetic, ledger.momentum) = (kinetic, momentum);
+                    }
                 }
-                (ledger.kinetic, ledger.momentum) = (kinetic, momentum);
             }
             Solver::RungeKutta(method) => {
                 self.damping = method.damping;

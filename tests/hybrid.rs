@@ -3,7 +3,7 @@
 use bondwise::case::build::{Options, build};
 use bondwise::case::model::Case;
 use bondwise::case::read_text;
-use bondwise::discretization::collocation::SharedRow;
+use bondwise::discretization::collocation::{SharedRow, SharedSlope};
 use bondwise::discretization::{Collocation, Influence, PartialVolume, Regions, standard};
 use bondwise::execution::{Exec, Instructions, Limits, Packs};
 use bondwise::family::BondStates;
@@ -124,11 +124,82 @@ fn rows_are_the_plain_sums_on_every_set_of_instructions() {
     compare_rows::<3, Double>([35.0, 14.0, 13.0], 33, 1e-14);
 }
 
+/// Slopes of a block of cells on every set of instructions, beside a plain loop.
+fn compare_slopes<const D: usize>(cells: [f64; D], points: usize) {
+    let shape = Shape::Box { low: [0.0; D], high: cells.map(|n| n * H) };
+    let body = standard::body(Cloud::lattice(&shape, H, 5), 4.0 * H, PartialVolume::Ramp);
+    let Arrangement::Lattice(lattice) = &body.cloud.arrangement else { unreachable!() };
+    let fit = Collocation::new(2, points).on_lattice::<D>(H, 4.0 * H).unwrap();
+    let weights = fit.dilatation(&Influence::Linear);
+    let slope = SharedSlope::new(lattice, &fit, &weights).unwrap();
+    let few = body.cloud.slots.iter().copied().filter(|slot| slot % 7 == 3);
+    let regions = Regions::new(&body, &BondStates::whole(&body), few, 1);
+    let n = body.cloud.n_slots();
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut values = vec![0.0; D * n];
+    values.iter_mut().for_each(|value| *value = (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 0.5);
+    let u = components::<D, _>(&values);
+    let mut reference: Option<(Vec<f64>, Vec<f64>)> = None;
+    for instructions in Instructions::available() {
+        let mut exec = Exec::on(instructions);
+        let (mut divergence, mut gradient) = (vec![-7.0; n], vec![2.0; D * n]);
+        let (blocks, limits) = (&regions.collocated, &Limits::NONE);
+        exec.collocate_divergence::<D, Double>(&body, (&slope, 3.0), &regions, blocks, u, &mut divergence, limits);
+        let output = components_mut::<D, _>(&mut gradient);
+        exec.collocate_gradient::<D, Double>(&body, (&slope, 0.5), &regions, u[D - 1], output);
+        for slot in 0..n {
+            if !regions.has_row(slot) {
+                assert!(divergence[slot] == -7.0 && (0..D).all(|d| gradient[d * n + slot] == 2.0));
+                continue;
+            }
+            let (mut sum, mut size, mut slopes) = (0.0, 0.0, [2.0; D]);
+            for (step, weight) in fit.steps.as_ref().unwrap().iter().zip(&weights) {
+                let there = slot.wrapping_add_signed(lattice.shift(*step));
+                for d in 0..D {
+                    sum += 3.0 * weight[d] * (u[d][there] - u[d][slot]);
+                    slopes[d] += 0.5 * weight[d] * (u[D - 1][there] - u[D - 1][slot]);
+                    size += weight[d].abs();
+                }
+            }
+            // Some thirty terms of either sign, the largest as large as all weights together.
+            assert!((divergence[slot] - sum).abs() < 1e-14 * 3.0 * size, "{D}D {instructions:?}");
+            assert!((0..D).all(|d| (gradient[d * n + slot] - slopes[d]).abs() < 1e-14 * (2.0 + size)));
+        }
+        if instructions != Instructions::Baseline {
+            let this = (divergence, gradient);
+            if let Some(reference) = &reference {
+                assert!(this == *reference, "{instructions:?}");
+            }
+            reference = Some(this);
+        }
+    }
+}
+
+#[test]
+fn slopes_are_the_plain_sums_on_every_set_of_instructions() {
+    compare_slopes::<1>([70.0], 5);
+    compare_slopes::<2>([45.0, 20.0], 13);
+    compare_slopes::<3>([35.0, 14.0, 13.0], 33);
+}
+
 const BRANCHING: &str = "scheme = { hybrid = { rescale = true } }";
 
 /// A plate of glass with a notch, pulled apart: 120 × 80 cells.
 fn plate(discretization: &str, traction: &str, notch: &str) -> Simulation {
-    let text = format!(
+    let text = plate_text(discretization, traction, notch);
+    build(&read_text::<Case>("plate", &text, &[]).unwrap(), &Options::default()).unwrap()
+}
+
+/// The same of a state-based solid, whose ratio is not that of bonds.
+fn solid_plate(discretization: &str, law: &str) -> Simulation {
+    let text = plate_text(discretization, "6e6", NOTCH)
+        .replace("bond_based = {", &format!("{law} = {{ poisson = 0.2,"))
+        .replace("50 ns", "40 ns");
+    build(&read_text::<Case>("plate", &text, &[]).unwrap(), &Options::default()).unwrap()
+}
+
+fn plate_text(discretization: &str, traction: &str, notch: &str) -> String {
+    format!(
         r#"
 [case]
 title = "A plate that tears"
@@ -161,8 +232,7 @@ initial = {{ velocity = {{ component = 0, value = 0.0 }} }}
 end_time = "18 us"
 time_step = "50 ns"
 "#
-    );
-    build(&read_text::<Case>("plate", &text, &[]).unwrap(), &Options::default()).unwrap()
+    )
 }
 
 const NOTCH: &str = "cracks = [{ segment = { from = [-0.015, 0.0], to = [-0.005, 0.0] } }]";
@@ -229,9 +299,8 @@ fn no_bond_of_a_row_passes_the_critical_stretch_unseen() {
     assert!(most < 1.0, "{most}");
 }
 
-#[test]
-fn rows_and_bonds_give_the_crack_of_bonds_alone() {
-    let [mut hybrid, mut bonds] = [plate(BRANCHING, "6e6", NOTCH), plate("", "6e6", NOTCH)];
+/// Runs both and compares their cracks, the work of the loads and the balance of energy.
+fn compare_cracks([mut hybrid, mut bonds]: [Simulation; 2]) {
     run(&mut hybrid, |_| ());
     run(&mut bonds, |_| ());
     let [one, other] = [scalars(&mut hybrid, "damage"), scalars(&mut bonds, "damage")];
@@ -256,25 +325,76 @@ fn rows_and_bonds_give_the_crack_of_bonds_alone() {
 }
 
 #[test]
-fn the_same_bits_on_any_number_of_threads_and_in_mirrored_halves() {
-    let run_on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
-        pool.install(|| {
-            let mut torn = plate(BRANCHING, "6e6", NOTCH);
-            run(&mut torn, |_| ());
-            (torn.model.hash(), scalars(&mut torn, "damage"), scalars(&mut torn, "scheme"))
-        })
-    };
-    let (hash, damage, scheme) = run_on(1);
-    for threads in [2, 3] {
-        assert_eq!(run_on(threads).0, hash);
-    }
+fn rows_and_bonds_give_the_crack_of_bonds_alone() {
+    compare_cracks([plate(BRANCHING, "6e6", NOTCH), plate("", "6e6", NOTCH)]);
+}
+
+#[test]
+fn rows_of_a_state_based_solid_give_the_crack_of_its_bonds_alone() {
+    let hybrid = "scheme = { hybrid = {} }";
+    compare_cracks([solid_plate(hybrid, "state_based"), solid_plate("", "state_based")]);
+}
+
+/// Uniform strain of a state-based solid: energy by the moduli, and no force, in rows, in bonds and between.
+#[test]
+fn a_uniformly_strained_state_based_solid_is_at_rest_across_the_schemes() {
+    let (e, poisson, strains) = (72e9, 0.2, [3e-5, -1e-5, 4e-5]);
+    let text = plate_text("scheme = { hybrid = {} }", "0", "")
+        .replace("bond_based = {", "state_based_linear = { poisson = 0.2,")
+        .replace("50 ns", "40 ns")
+        .replace("[solver.velocity_verlet]", &format!(
+            "[[conditions]]\non = \"all\"\ninitial = {{ displacement = {{ component = 0, value = \"{:e} * x + {:e} * y\" }} }}\n\
+             [[conditions]]\non = \"all\"\ninitial = {{ displacement = {{ component = 1, value = \"{:e} * y\" }} }}\n\
+             [solver.velocity_verlet]",
+            strains[0], strains[2], strains[1]
+        ));
+    let mut body = build(&read_text::<Case>("plate", &text, &[]).unwrap(), &Options::default()).unwrap();
+    body.model.start();
+    let (scheme, energy) = (scalars(&mut body, "scheme"), scalars(&mut body, "strain_energy"));
+    let Some(Field { values: Values::Vector(force), .. }) = body.model.field("force") else { panic!() };
+    let [x, y, xy] = strains;
+    let exact = 0.5 * e / (1.0 - poisson * poisson) * (x * x + y * y + 2.0 * poisson * x * y)
+        + 0.25 * e / (1.0 + poisson) * xy * xy;
     let [nx, ny] = CELLS;
-    for field in [damage, scheme] {
-        for k in 0..nx * ny {
-            assert_eq!(field[k], field[k % nx + nx * (ny - 1 - k / nx)]);
+    let mut rows = 0;
+    for k in 0..nx * ny {
+        if scheme[k] == 0.0 {
+            rows += 1;
+            assert!((energy[k] / exact - 1.0).abs() < 1e-10, "{} against {exact}", energy[k]);
+        }
+        // What bonds pull with is the stress over the spacing; two passes reach two horizons of four spacings.
+        let [i, j] = [k % nx, k / nx];
+        if i.min(nx - 1 - i).min(j).min(ny - 1 - j) >= 8 {
+            assert!(force[k].iter().all(|f| f.abs() < 1e-10 * e * xy / 2.5e-4), "{i} {j}: {:?}", force[k]);
         }
     }
+    assert!(rows > 3000);
+}
+
+#[test]
+fn the_same_bits_on_any_number_of_threads_and_in_mirrored_halves() {
+    let bits = |make: &(dyn Fn() -> Simulation + Sync)| {
+        let run_on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
+            pool.install(|| {
+                let mut torn = make();
+                run(&mut torn, |_| ());
+                (torn.model.hash(), scalars(&mut torn, "damage"), scalars(&mut torn, "scheme"))
+            })
+        };
+        let (hash, damage, scheme) = run_on(1);
+        for threads in [2, 3] {
+            assert_eq!(run_on(threads).0, hash);
+        }
+        let [nx, ny] = CELLS;
+        for field in [damage, scheme] {
+            for k in 0..nx * ny {
+                assert_eq!(field[k], field[k % nx + nx * (ny - 1 - k / nx)]);
+            }
+        }
+    };
+    bits(&|| plate(BRANCHING, "6e6", NOTCH));
+    bits(&|| solid_plate("scheme = { hybrid = {} }", "state_based"));
 }
 
 #[test]
@@ -282,6 +402,12 @@ fn where_all_points_sum_their_bonds_it_is_the_standard_scheme() {
     let all = "scheme = { hybrid = { standard = [\"all\"], damping = 0.0 } }";
     let hashes = [all, ""].map(|discretization| {
         let mut torn = plate(discretization, "6e6", NOTCH);
+        run(&mut torn, |_| ());
+        torn.model.hash()
+    });
+    assert_eq!(hashes[0], hashes[1]);
+    let hashes = [all, ""].map(|discretization| {
+        let mut torn = solid_plate(discretization, "state_based");
         run(&mut torn, |_| ());
         torn.model.hash()
     });
@@ -342,7 +468,7 @@ end_time = "200 us"
 /// Rows and bonds are no symmetric operator, whose motion grows; damped as a whole it does not.
 #[test]
 fn energy_does_not_grow_after_a_pulse() {
-    let pulse = |damping: &str| {
+    let pulse = |law: &str, damping: &str, step: f64| {
         let text = format!(
             r#"
 [case]
@@ -353,15 +479,15 @@ shape = {{ rectangle = {{ size = [40.0, 30.0] }} }}
 spacing = 1.0
 [discretization]
 horizon_ratio = 4.0
-scheme = {{ hybrid = {{ rescale = true, {damping} }} }}
+scheme = {{ hybrid = {{ {damping} }} }}
 [physics.elasticity]
-law = {{ bond_based_linear = {{ young = 1.0, density = 1.0 }} }}
+law = {{ {law}, young = 1.0, density = 1.0 }} }}
 [[conditions]]
 on = "all"
 initial = {{ displacement = {{ component = 0, value = "1e-3 * exp(-((x - 3)^2 + y^2) / 25)" }} }}
 [solver.velocity_verlet]
 end_time = 2000.0
-time_step = 1.0
+time_step = {step}
 "#
         );
         let mut body = build(&read_text::<Case>("pulse", &text, &[]).unwrap(), &Options::default()).unwrap();
@@ -379,12 +505,17 @@ time_step = 1.0
         }
         energies
     };
-    let damped = pulse("damping = 0.05");
-    // A hundredth: what rows and bonds exchange may be of either sign as long as waves are short.
-    assert!(damped.windows(2).all(|pair| pair[1] <= 1.01 * pair[0]), "{damped:?}");
-    assert!(damped[damped.len() - 1] < 0.1 * damped[0]);
-    for growing in ["damping = 0.0", "damp_bonds = false"] {
-        let energies = pulse(growing);
+    let bonds = "bond_based_linear = { plane = \"stress\"";
+    let solids = [-0.3, 0.2, 0.45].map(|poisson| format!("state_based_linear = {{ poisson = {poisson}"));
+    let solids = solids.iter().map(|law| (&law[..], "", 0.5));
+    for (law, damping, step) in std::iter::once((bonds, "rescale = true, damping = 0.05", 1.0)).chain(solids) {
+        let damped = pulse(law, damping, step);
+        // A hundredth: what rows and bonds exchange may be of either sign as long as waves are short.
+        assert!(damped.windows(2).all(|pair| pair[1] <= 1.01 * pair[0]), "{law}: {damped:?}");
+        assert!(damped[damped.len() - 1] < 0.1 * damped[0], "{law}: {damped:?}");
+    }
+    for growing in ["rescale = true, damping = 0.0", "rescale = true, damp_bonds = false"] {
+        let energies = pulse(bonds, growing, 1.0);
         assert!(energies[energies.len() - 1] > 10.0 * energies[0], "{growing}: {energies:?}");
     }
 }

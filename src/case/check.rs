@@ -479,9 +479,16 @@ impl Checker<'_> {
         if case.refinement.is_some() {
             self.error("refinement", "the state-based law needs cells of one size", bonds);
         }
-        if let Scheme::Hybrid(_) = &case.discretization.scheme {
-            let message = "the state-based law has no collocation rows in a run yet";
-            self.error("discretization.scheme", message, "use `scheme = \"standard\"`, or a bond-based law");
+        if let Scheme::Hybrid(hybrid) = &case.discretization.scheme {
+            if hybrid.buffer < 2 {
+                let message = "rows of the state-based law feel what points at two horizons do, in two passes";
+                self.error("discretization.scheme.hybrid.buffer", message, "use 2 or more");
+            }
+            if hybrid.rescale {
+                let message =
+                    "the state-based law measures each family by its own weighted volume: nothing is left to rescale";
+                self.error("discretization.scheme.hybrid.rescale", message, "remove it");
+            }
         }
         for (path, solver) in case.solver.stages() {
             if matches!(solver, Solver::Static(_) | Solver::Newton(_) | Solver::QuasiStatic(_)) {

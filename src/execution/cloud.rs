@@ -70,7 +70,7 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
                         largest = self.small(point);
                     }
                 }
-                if largest > K::SMALL {
+                if K::TWO_FORMS && largest > K::SMALL {
                     self.sum::<false, false>(point);
                 }
             }

@@ -3,16 +3,19 @@
 //! Beside the force, the displacements at the nearest points tell how far the family is strained, without a look at its
 //! bonds.
 
+mod slopes;
+
 use rayon::prelude::*;
 
 use super::packs::{Ends, Instructions, Pack, Packs};
 use super::{Exec, SharedSlice};
 use crate::discretization::Regions;
-use crate::discretization::collocation::{Pair, SharedRow};
-use crate::family::{Body, Class};
+use crate::discretization::collocation::{Pair, RowClass, SharedRow};
+use crate::family::Body;
 use crate::field::Number;
 use crate::geometry::lattice::BLOCK;
 use crate::geometry::{Arrangement, Lattice};
+use crate::lane::Lane;
 
 /// How far a point with a row may be strained.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +30,19 @@ pub struct Limits {
 impl Limits {
     /// Nothing is too far.
     pub const NONE: Limits = Limits { strain: f64::INFINITY, linear: true, gradient: f64::INFINITY };
+
+    /// Below this, the root n of the sum of the squares of all one-sided derivatives keeps both: the gradient is at most n,
+    /// and the strain, as [`Exec::collocate`] judges it, at most n + n²/2.
+    fn calm(&self) -> f64 {
+        // tr E/D + √((D − 1)/D) |dev E| ≤ |E|. Its linear part: larger ones of two normal strains, and shear strains from
+        // means of two, both at most n together; GᵀG: |G|² at most. A thousandth for the rounding of single precision.
+        let strain = if self.linear || self.strain.is_infinite() {
+            self.strain
+        } else {
+            2.0 * self.strain / ((1.0 + 2.0 * self.strain).sqrt() + 1.0)
+        };
+        0.999 * strain.min(self.gradient)
+    }
 }
 
 /// Blocks in a chunk.
@@ -38,20 +54,31 @@ struct Sum<'a, const D: usize, P: Packs> {
     lattice: &'a Lattice<D>,
     regions: &'a Regions,
     pairs: Vec<BondPair<D, P::Bond>>,
-    classes: &'a [Class],
+    slopes: Vec<BondSlope<D, P::Bond>>,
+    classes: &'a [RowClass],
     input: [&'a [P::Field]; D],
+    /// What slopes take the gradient of.
+    scalar: &'a [P::Field],
     output: &'a [SharedSlice<P::Field>],
     /// 1/limits, 1/Δx, and what the products of gradients count.
     strain: P::Bond,
     gradient: P::Bond,
     inverse_spacing: P::Bond,
     products: P::Bond,
+    /// 1/s²: where the squares of all differences to the nearest points add up to less than s², `limits` are kept.
+    calm: P::Bond,
 }
 
 /// A pair in the numbers of the bond arithmetic.
 struct BondPair<const D: usize, B> {
     shift: isize,
     weight: [[B; D]; D],
+}
+
+/// The same of a slope.
+struct BondSlope<const D: usize, B> {
+    shift: isize,
+    weight: [B; D],
 }
 
 impl Exec {
@@ -78,19 +105,10 @@ impl Exec {
         limits: &Limits,
     ) -> Vec<u32> {
         let output = self.shared(body, &input, output);
-        let sum = Sum::<D, P>::new(self.instructions, body, row, regions, input, &output, limits);
-        let chunks = blocks.par_chunks(CHUNK).map(|blocks| {
-            let mut beyond = Vec::new();
-            for &block in blocks {
-                let slot = sum.lattice.guard + block as usize * BLOCK;
-                // SAFETY: the slots of a block belong to its chunk alone, and what its row reaches lies between the guards:
-                // `shared` and `SharedRow::new` have seen to it.
-                let bits = unsafe { sum.force(slot) };
-                beyond.extend((0..BLOCK).filter(|k| bits >> k & 1 == 1).map(|k| (slot + k) as u32));
-            }
-            beyond
-        });
-        chunks.collect::<Vec<_>>().concat()
+        let sum = Sum::<D, P>::new(self.instructions, body, regions, input, &output, limits).of(row);
+        // SAFETY: the slots of a block belong to its chunk alone, and what its row reaches lies between the guards: `shared`
+        // and `SharedRow::new` have seen to it.
+        sum.each(blocks, |slot| unsafe { sum.force(slot) })
     }
 
     /// density(x) = ¼ Σ_j (u_j − u)·K_j (u_j − u), J/m³, at the points that have a row: −½ Σ u·L u V where all points have
@@ -104,12 +122,11 @@ impl Exec {
         density: &mut [P::Field],
     ) {
         let output = self.shared(body, &input, [density]);
-        let sum = Sum::<D, P>::new(self.instructions, body, row, regions, input, &output, &Limits::NONE);
-        regions.collocated.par_chunks(CHUNK).for_each(|blocks| {
-            for &block in blocks {
-                // SAFETY: as above.
-                unsafe { sum.energy(sum.lattice.guard + block as usize * BLOCK) };
-            }
+        let sum = Sum::<D, P>::new(self.instructions, body, regions, input, &output, &Limits::NONE).of(row);
+        // SAFETY: as above.
+        sum.each(&regions.collocated, |slot| unsafe {
+            sum.energy(slot);
+            0
         });
     }
 
@@ -130,28 +147,48 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
     fn new(
         instructions: Instructions,
         body: &'a Body<D>,
-        row: &'a SharedRow<D>,
         regions: &'a Regions,
         input: [&'a [P::Field]; D],
         output: &'a [SharedSlice<P::Field>],
         limits: &Limits,
     ) -> Self {
         let Arrangement::Lattice(lattice) = &body.cloud.arrangement else { panic!("shared rows are of lattices") };
-        let pair =
-            |pair: &Pair<D>| BondPair { shift: pair.shift, weight: pair.weight.map(|w| w.map(P::Bond::from_f64)) };
         Sum {
             instructions,
             lattice,
             regions,
-            pairs: row.pairs.iter().map(pair).collect(),
-            classes: &row.classes,
+            pairs: Vec::new(),
+            slopes: Vec::new(),
+            classes: &[],
             input,
+            scalar: &[],
             output,
             strain: P::Bond::from_f64(1.0 / limits.strain),
             gradient: P::Bond::from_f64(limits.gradient.powi(-2)),
             inverse_spacing: P::Bond::from_f64(1.0 / lattice.spacing),
             products: P::Bond::from_f64(if limits.linear { 0.0 } else { 1.0 }),
+            calm: P::Bond::from_f64((limits.calm() * lattice.spacing).powi(-2)),
         }
+    }
+
+    fn of(self, row: &'a SharedRow<D>) -> Self {
+        let pair =
+            |pair: &Pair<D>| BondPair { shift: pair.shift, weight: pair.weight.map(|w| w.map(P::Bond::from_f64)) };
+        Sum { pairs: row.pairs.iter().map(pair).collect(), classes: &row.classes, ..self }
+    }
+
+    /// Does something with the first slot of each block; gives the slots whose bits it returns.
+    fn each(&self, blocks: &[u32], work: impl Fn(usize) -> u16 + Sync) -> Vec<u32> {
+        let chunks = blocks.par_chunks(CHUNK).map(|blocks| {
+            let mut found = Vec::new();
+            for &block in blocks {
+                let slot = self.lattice.guard + block as usize * BLOCK;
+                let bits = work(slot);
+                found.extend((0..BLOCK).filter(|k| bits >> k & 1 == 1).map(|k| (slot + k) as u32));
+            }
+            found
+        });
+        chunks.collect::<Vec<_>>().concat()
     }
 
     compiled!(force, force_on, force_avx2, force_avx512, [], (slot: usize), u16);
@@ -172,49 +209,99 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
                 for i in 0..D {
                     twice[i] = V::twice(here[i]);
                 }
-                let mut total = [V::splat(0.0); D];
-                let mut waiting = [[V::splat(0.0); D]; 3];
-                let mut pairs = self.pairs.iter();
+                let (mut total, mut across) = ([V::splat(0.0); D], [V::splat(0.0); D]);
+                let mut begin = 0;
                 for class in self.classes {
-                    for sequence in 0..1 << (class.axes - 1) {
-                        let mut sum = [V::splat(0.0); D];
-                        for pair in pairs.by_ref().take(class.members as usize) {
-                            let mut bend = [V::splat(0.0); D];
-                            for i in 0..D {
-                                let [after, before] = self.ends::<V>(i, first, pair.shift);
-                                bend[i] = V::bend(after, before, twice[i]);
+                    let n = class.members;
+                    for k in begin..begin + n {
+                        let weight = &self.pairs.get_unchecked(k).weight;
+                        // Σ of b over mirror images, and for each two axes Σ of b with the sign that their weight has.
+                        let (even, odd) = match class.images {
+                            1 => (self.bend::<V>(k, first, &twice), [[V::splat(0.0); D]; 3]),
+                            2 => {
+                                let (a, b) = (self.bend::<V>(k, first, &twice), self.bend::<V>(k + n, first, &twice));
+                                let difference = less(a, b);
+                                (super::lattice::add(a, b), [difference; 3])
                             }
-                            for o in 0..D {
-                                for i in 0..D {
-                                    sum[o] = V::broadcast(pair.weight[o][i]).mul_add(bend[i], sum[o]);
+                            _ => {
+                                let (a, b) = (self.bend::<V>(k, first, &twice), self.bend::<V>(k + n, first, &twice));
+                                let c = self.bend::<V>(k + 2 * n, first, &twice);
+                                let d = self.bend::<V>(k + 3 * n, first, &twice);
+                                let (ab, cd) = (super::lattice::add(a, b), super::lattice::add(c, d));
+                                let (a_b, c_d) = (less(a, b), less(c, d));
+                                // Images mirrored in the first axis, in the second, in both: axes 0 1, 0 2, 1 2.
+                                (
+                                    super::lattice::add(ab, cd),
+                                    [less(a_b, c_d), super::lattice::add(a_b, c_d), less(ab, cd)],
+                                )
+                            }
+                        };
+                        for o in 0..D {
+                            total[o] = V::broadcast(weight[o][o]).mul_add(even[o], total[o]);
+                            for i in 0..D {
+                                if o != i && class.axes >> o & class.axes >> i & 1 == 1 {
+                                    across[o] = V::broadcast(weight[o][i]).mul_add(odd[o + i - 1][i], across[o]);
                                 }
                             }
                         }
-                        let mut level = 0;
-                        while sequence >> level & 1 == 1 {
-                            sum = super::lattice::add(waiting[level], sum);
-                            level += 1;
-                        }
-                        waiting[level] = sum;
                     }
-                    total = super::lattice::add(total, waiting[class.axes as usize - 1]);
+                    begin += n * class.images;
                 }
-                for strained in self.strained::<V>(first, &here) {
-                    let strained = strained.keep(mask);
-                    if strained.largest() > 0.0 {
-                        for lane in 0..V::LANES {
-                            if strained.lane(lane) > 0.0 {
-                                beyond |= 1 << (part * V::LANES + lane);
-                            }
-                        }
-                    }
-                }
+                beyond |= self.beyond::<V>(first, &here, mask) << (part * V::LANES);
                 for o in 0..D {
-                    self.store(total[o], o, first, mask);
+                    self.store(total[o] + across[o], o, first, mask);
                 }
             }
         }
         beyond
+    }
+
+    /// The bits of the points that are strained too far.
+    #[inline(always)]
+    unsafe fn beyond<V: Pack<P::Bond> + Ends<P::Field>>(&self, first: usize, here: &[V::Held; D], mask: u16) -> u16 {
+        let mut beyond = 0;
+        // SAFETY: as of the row.
+        if !unsafe { self.is_calm::<V>(first, here, mask) } {
+            for strained in unsafe { self.strained::<V>(first, here) } {
+                let strained = strained.keep(mask);
+                for lane in 0..V::LANES {
+                    if strained.lane(lane) > 0.0 {
+                        beyond |= 1 << lane;
+                    }
+                }
+            }
+        }
+        beyond
+    }
+
+    /// b of a pair: the values on both sides, less twice the value between.
+    #[inline(always)]
+    unsafe fn bend<V: Pack<P::Bond> + Ends<P::Field>>(&self, k: usize, first: usize, twice: &[V::Held; D]) -> [V; D] {
+        let mut bend = [V::splat(0.0); D];
+        for i in 0..D {
+            // SAFETY: pairs are of the row, whose reach is inside the input.
+            let [after, before] = unsafe { self.ends::<V>(i, first, self.pairs.get_unchecked(k).shift) };
+            bend[i] = V::bend(after, before, twice[i]);
+        }
+        bend
+    }
+
+    /// Whether all points are strained so little that no limit is near: true nearly everywhere, and quickly seen.
+    #[inline(always)]
+    unsafe fn is_calm<V: Pack<P::Bond> + Ends<P::Field>>(&self, first: usize, here: &[V::Held; D], mask: u16) -> bool {
+        let mut squares = V::splat(0.0);
+        for d in 0..D {
+            for i in 0..D {
+                // SAFETY: as of the row, which reaches at least as far.
+                let ends = unsafe { self.ends::<V>(i, first, self.lattice.strides[d] as isize) };
+                for end in ends {
+                    let difference = V::relative(end, here[i], u16::MAX);
+                    squares = difference.mul_add(difference, squares);
+                }
+            }
+        }
+        let squares = squares * V::broadcast(self.calm);
+        squares.keep(mask).largest() < 1.0
     }
 
     /// How far the nearest points are strained, and how large the gradient is: positive where that is more than is allowed.
@@ -340,4 +427,12 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
             }
         }
     }
+}
+
+#[inline(always)]
+fn less<V: Lane, const D: usize>(mut a: [V; D], b: [V; D]) -> [V; D] {
+    for d in 0..D {
+        a[d] = a[d] - b[d];
+    }
+    a
 }

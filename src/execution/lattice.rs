@@ -109,7 +109,7 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
                         largest = self.sum::<true>(words, slot);
                     }
                 }
-                if largest > K::SMALL {
+                if K::TWO_FORMS && largest > K::SMALL {
                     self.sum::<false>(words, slot);
                 }
             }

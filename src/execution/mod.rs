@@ -69,6 +69,24 @@ pub use collocation::Limits;
 pub use packs::{Instructions, Packs};
 pub use point_rows::PointRows;
 
+/// Does `work`, compiled for the registers of AVX2 where the machine has them: four numbers at once instead of two in loops
+/// over plain vectors. Nothing is fused, so the bits are those of the baseline.
+#[inline(always)]
+pub fn wide<R>(work: impl FnOnce() -> R) -> R {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        unsafe fn on_avx2<R>(work: impl FnOnce() -> R) -> R {
+            work()
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the machine has it.
+            return unsafe { on_avx2(work) };
+        }
+    }
+    work()
+}
+
 /// Which bonds break: asked only about bonds strained beyond `threshold`, in the strain of the kernel.
 pub trait BreakRule<const D: usize>: Sync {
     /// Whether no bond ever breaks, so that nothing need be compiled for it.

@@ -32,6 +32,8 @@ impl<const D: usize> Bond<D, f64> {
 pub trait BondKernel<const D: usize, const I: usize, const O: usize>: Sync {
     /// |strain| up to which [`BondKernel::add_small`] may stand for [`BondKernel::add`].
     const SMALL: f64 = f64::INFINITY;
+    /// Whether there are two forms: where there is one, the other is not compiled.
+    const TWO_FORMS: bool = Self::SMALL < f64::INFINITY;
     /// Whether the summand is linear in the relative values and the same along −ξ as along ξ.
     const LINEAR: bool = false;
     /// Whether the summand is zero where the ends have the same values. Broken bonds are given as such, which saves
@@ -42,8 +44,11 @@ pub trait BondKernel<const D: usize, const I: usize, const O: usize>: Sync {
     const ADDED: usize = 0;
 
     /// What decides about breaking and about the form: computed once, whichever form follows. `relative`: values at
-    /// x′ less values at x, the last `ADDED` of them values at x′ and x added.
-    fn strain<L: Lane>(&self, bond: &Bond<D, L>, relative: &[L; I]) -> L;
+    /// x′ less values at x, the last `ADDED` of them values at x′ and x added. Nothing, unless the kernel says otherwise.
+    #[inline(always)]
+    fn strain<L: Lane>(&self, _bond: &Bond<D, L>, _relative: &[L; I]) -> L {
+        L::splat(0.0)
+    }
 
     /// `sum` and the summand of x, exactly.
     fn add<L: Lane>(&self, bond: &Bond<D, L>, relative: &[L; I], strain: L, sum: [L; O]) -> [L; O];

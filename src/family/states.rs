@@ -146,12 +146,13 @@ impl BondStates {
             Families::Cloud(_) => 2.0 * body.horizon,
         };
         let near = body.cloud.select(|x| (0..D).all(|d| x[d] >= low[d] - reach && x[d] <= high[d] + reach));
+        let blade = crack.blade(tolerance);
         let mut cut = 0;
         for slot in near {
             let slot = slot as usize;
             let a = body.cloud.position(slot);
             self.retain(body, slot, |other| {
-                let keep = !crack.cuts(&a, &body.cloud.position(other), tolerance);
+                let keep = !blade.cuts(&a, &body.cloud.position(other));
                 cut += u64::from(!keep);
                 keep
             });

@@ -65,25 +65,22 @@ impl<const D: usize> Crack<D> {
     ///
     /// Expects a crack that has passed [`validate`](Self::validate).
     pub fn cuts(&self, a: &Vector<D>, b: &Vector<D>, tolerance: f64) -> bool {
-        // One order for both directions: rounded values could depend on it.
-        let (a, b) = if b < a { (b, a) } else { (a, b) };
-        match self {
-            Crack::Point(x) => (a[0] - x >= -tolerance) != (b[0] - x >= -tolerance),
-            Crack::Polyline(vertices) => {
-                let bond = [[a[0], a[1]], [b[0], b[1]]];
-                polyline_cuts(vertices, bond, tolerance)
-            }
-            Crack::Polygon(vertices) => {
-                let bond = [[a[0], a[1], a[2]], [b[0], b[1], b[2]]];
-                polygon_cuts(vertices, bond, tolerance)
-            }
-            Crack::Disc { center, normal, radius } => {
-                let bond = [[a[0], a[1], a[2]], [b[0], b[1], b[2]]];
-                let length = norm(normal);
-                let heights = bond.map(|x| dot(normal, &difference(&x, center)) / length);
-                crossing(bond, heights, tolerance).is_some_and(|point| distance(&point, center) < radius - tolerance)
-            }
+        self.blade(tolerance).cuts(a, b)
+    }
+
+    /// What asks many bonds whether this crack cuts them. `tolerance` as of [`cuts`](Self::cuts).
+    pub fn blade(&self, tolerance: f64) -> Blade<'_, D> {
+        let (mut low, mut high) = self.bounds();
+        for d in 0..D {
+            // Twice: what is that far off is not even touched.
+            low[d] -= 2.0 * tolerance;
+            high[d] += 2.0 * tolerance;
         }
+        let plane = match self {
+            Crack::Polygon(vertices) => Some(Plane::through(vertices)),
+            _ => None,
+        };
+        Blade { crack: self, plane, low, high, tolerance }
     }
 
     /// Checks sizes, coordinates and whether the crack exists in `D` dimensions.
@@ -139,6 +136,47 @@ impl<const D: usize> Crack<D> {
     }
 }
 
+/// A crack made ready to be asked about many bonds.
+pub struct Blade<'a, const D: usize> {
+    crack: &'a Crack<D>,
+    /// Of a polygon.
+    plane: Option<Plane>,
+    /// A box that holds the crack: bonds beside it are not cut.
+    low: Vector<D>,
+    high: Vector<D>,
+    tolerance: f64,
+}
+
+impl<const D: usize> Blade<'_, D> {
+    /// As [`Crack::cuts`].
+    pub fn cuts(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
+        let (low, high, tolerance) = (&self.low, &self.high, self.tolerance);
+        let beside = |d: usize| (a[d] < low[d] && b[d] < low[d]) || (a[d] > high[d] && b[d] > high[d]);
+        if (0..D).any(beside) {
+            return false;
+        }
+        // One order for both directions: rounded values could depend on it.
+        let (a, b) = if b < a { (b, a) } else { (a, b) };
+        match self.crack {
+            Crack::Point(x) => (a[0] - x >= -tolerance) != (b[0] - x >= -tolerance),
+            Crack::Polyline(vertices) => {
+                let bond = [[a[0], a[1]], [b[0], b[1]]];
+                polyline_cuts(vertices, bond, tolerance)
+            }
+            Crack::Polygon(vertices) => {
+                let bond = [[a[0], a[1], a[2]], [b[0], b[1], b[2]]];
+                self.plane.as_ref().is_some_and(|plane| polygon_cuts(vertices, plane, bond, tolerance))
+            }
+            Crack::Disc { center, normal, radius } => {
+                let bond = [[a[0], a[1], a[2]], [b[0], b[1], b[2]]];
+                let length = norm(normal);
+                let heights = bond.map(|x| dot(normal, &difference(&x, center)) / length);
+                crossing(bond, heights, tolerance).is_some_and(|point| distance(&point, center) < radius - tolerance)
+            }
+        }
+    }
+}
+
 /// A bond is cut between two vertices where it touches neither, or at an inner vertex.
 fn polyline_cuts(vertices: &[[f64; 2]], bond: [[f64; 2]; 2], tolerance: f64) -> bool {
     let [a, b] = bond;
@@ -181,8 +219,7 @@ fn touches(bond: [[f64; 2]; 2], point: [f64; 2], tolerance: f64) -> bool {
     in_box && orientation(a, b, point).abs() <= tolerance * distance(&a, &b)
 }
 
-fn polygon_cuts(vertices: &[[f64; 3]], bond: [[f64; 3]; 2], tolerance: f64) -> bool {
-    let plane = Plane::through(vertices);
+fn polygon_cuts(vertices: &[[f64; 3]], plane: &Plane, bond: [[f64; 3]; 2], tolerance: f64) -> bool {
     let Some(point) = crossing(bond, bond.map(|x| plane.height(x)), tolerance) else {
         return false;
     };

@@ -16,11 +16,12 @@ use rayon::prelude::*;
 use super::Problem;
 use crate::conditions::Prescribed;
 use crate::discretization::Regions;
-use crate::discretization::collocation::SharedRow;
+use crate::discretization::collocation::{SharedRow, SharedSlope};
 use crate::execution::{Exec, Limits, Packs};
 use crate::family::{Body, BondLaw, Families};
-use crate::field::{Number, Precision, components, components_mut};
-use crate::physics::elasticity::{Edge, Elasticity, Overstretched, State};
+use crate::field::{Double, Number, Precision, components, components_mut};
+use crate::physics::elasticity::state_based::Changing;
+use crate::physics::elasticity::{Edge, Elasticity, Overstretched, State, doubles, doubles_mut};
 
 /// Numbers that a thread updates at a time.
 const CHUNK: usize = 16 * 1024;
@@ -28,10 +29,23 @@ const CHUNK: usize = 16 * 1024;
 /// Evaluations between two looks at the power of the damping.
 const LOOKS: u64 = 20;
 
+/// What rows of a state-based solid need beside that of its bonds: the slope that gives dilatation from displacements and
+/// force from dilatation, see `collocation::state_based`. In p of [`StateBased`](crate::physics::elasticity::state_based),
+/// p = (D² k − A G)/(D M) θ and the force is (M/D) ∇p.
+pub struct Dilatation<const D: usize> {
+    pub slope: SharedSlope<D>,
+    /// (D² k − A G)/(D M) and M/D.
+    pub scales: [f64; 2],
+    /// h, 1/Pa: the energy is p²/2h.
+    pub bulk: f64,
+}
+
 /// Which points have rows, the row, and when points switch.
 pub struct Hybrid<const D: usize, P: Precision> {
     pub regions: Regions,
     pub row: SharedRow<D>,
+    /// None for a solid of bonds.
+    pub dilatation: Option<Dilatation<D>>,
     /// Largest |eigenvalue| of the row on an infinite lattice, N/m⁴ (3D).
     pub radius: f64,
     /// τ, s
@@ -69,6 +83,7 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
         Hybrid {
             regions,
             row,
+            dilatation: None,
             radius,
             damping: 0.0,
             damps_bonds: true,
@@ -103,19 +118,26 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
         dt: f64,
     ) {
         self.look_ahead(&state.displacement, &state.velocity);
-        let strained = self.sum(body, exec, false, state);
+        if self.dilatation.is_some() {
+            state.changing().turn();
+        }
+        let strained = self.first_rows(body, exec, state);
         if self.adaptive {
             self.switch(body, exec, &strained);
         } else if !strained.is_empty() {
             self.warn(body, strained[0] as usize);
         }
+        let tau = if self.damps_bonds { self.damping } else { 0.0 };
         loop {
             let edge = Edge { regions: &self.regions, overstretched: Mutex::default() };
-            let tau = if self.damps_bonds { self.damping } else { 0.0 };
             Self::at(&mut self.ahead, tau, state, |state| {
                 // So that what a bond holds is that of the displacements before the step.
                 let since = if dt > 0.0 { dt + tau } else { 0.0 };
-                physics.evaluate(body, exec, state, since, Some(&edge));
+                if self.dilatation.is_some() {
+                    physics.extend(body, exec, state, since, physics.failure.as_ref(), Some(&edge));
+                } else {
+                    physics.evaluate(body, exec, state, since, Some(&edge));
+                }
             });
             let list = edge.overstretched.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
             let Overstretched { broken, held } = list;
@@ -133,7 +155,7 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
                 break;
             }
         }
-        self.sum(body, exec, true, state);
+        self.last_rows(physics, body, exec, state);
         self.count(body);
     }
 
@@ -146,14 +168,53 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
         state: &mut State<P>,
     ) {
         self.look_ahead(&state.displacement, &state.velocity);
-        self.sum(body, exec, false, state);
+        self.first_rows(body, exec, state);
         let tau = if self.damps_bonds { self.damping } else { 0.0 };
-        Self::at(&mut self.ahead, tau, state, |State { displacement, force, states, .. }| {
+        Self::at(&mut self.ahead, tau, state, |state| {
+            if self.dilatation.is_some() {
+                let edge = Edge { regions: &self.regions, overstretched: Mutex::default() };
+                return physics.extend(body, exec, state, 0.0, None, Some(&edge));
+            }
+            let State { displacement, force, states, .. } = state;
             let (input, output) = (components::<D, _>(displacement), components_mut::<D, _>(force));
             physics.force_density::<D, P>(body, exec, states, input, output);
         });
-        self.sum(body, exec, true, state);
+        self.last_rows(physics, body, exec, state);
         self.count(body);
+    }
+
+    /// What rows give before bonds are summed: their force, or the dilatation of a state-based solid. Gives the slots that
+    /// are strained too far.
+    fn first_rows(&self, body: &Body<D>, exec: &mut Exec, state: &mut State<P>) -> Vec<u32> {
+        let (blocks, limits) = (&self.regions.collocated, &self.limits);
+        match &self.dilatation {
+            Some(dilatation) => self.dilate(dilatation, body, exec, blocks, limits, state),
+            None => self.rows(body, exec, blocks, limits, state),
+        }
+    }
+
+    /// What rows give after that: the same again in the blocks that the bonds have written to, and the forces of a
+    /// state-based solid.
+    fn last_rows<L: BondLaw<D>>(
+        &mut self,
+        physics: &Elasticity<L>,
+        body: &Body<D>,
+        exec: &mut Exec,
+        state: &mut State<P>,
+    ) {
+        let limits = &Limits::NONE;
+        let Some(dilatation) = &self.dilatation else {
+            self.rows(body, exec, &self.regions.mixed, limits, state);
+            return;
+        };
+        self.dilate(dilatation, body, exec, &self.regions.mixed, limits, state);
+        let tau = if self.damps_bonds { self.damping } else { 0.0 };
+        Self::at(&mut self.ahead, tau, state, |state| physics.pull(body, exec, state));
+        self.rows(body, exec, &self.regions.collocated, limits, state);
+        let Changing { force, tension, .. } = state.changing();
+        let slope = (&dilatation.slope, dilatation.scales[1]);
+        let force = components_mut::<D, _>(force);
+        exec.collocate_gradient::<D, Double>(body, slope, &self.regions, &tension[0], force);
     }
 
     /// Does something with u + τ v in the place of the displacements.
@@ -200,12 +261,39 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
         });
     }
 
-    /// Applies the rows everywhere, or in the blocks that the sums over bonds have written to.
-    fn sum(&self, body: &Body<D>, exec: &mut Exec, mixed: bool, state: &mut State<P>) -> Vec<u32> {
-        let blocks = if mixed { &self.regions.mixed } else { &self.regions.collocated };
-        let input = if self.damping == 0.0 { &state.displacement } else { &self.ahead };
-        let (input, output) = (components::<D, _>(input), components_mut::<D, _>(&mut state.force));
-        exec.collocate::<D, P>(body, &self.row, &self.regions, blocks, input, output, &self.limits)
+    /// What rows act on: u + τ v.
+    fn input<'a>(&'a self, state: &'a State<P>) -> &'a [P::Field] {
+        if self.damping == 0.0 { &state.displacement } else { &self.ahead }
+    }
+
+    /// Applies the rows of bonds.
+    fn rows(&self, body: &Body<D>, exec: &mut Exec, blocks: &[u32], limits: &Limits, state: &mut State<P>) -> Vec<u32> {
+        let mut force = std::mem::take(&mut state.force);
+        let (input, output) = (components::<D, _>(self.input(state)), components_mut::<D, _>(&mut force));
+        let strained = exec.collocate::<D, P>(body, &self.row, &self.regions, blocks, input, output, limits);
+        state.force = force;
+        strained
+    }
+
+    /// p of a state-based solid by rows.
+    fn dilate(
+        &self,
+        dilatation: &Dilatation<D>,
+        body: &Body<D>,
+        exec: &mut Exec,
+        blocks: &[u32],
+        limits: &Limits,
+        state: &mut State<P>,
+    ) -> Vec<u32> {
+        let [now, _] = &mut state.tension;
+        let mut tension = std::mem::take(now);
+        tension.resize(body.cloud.n_slots(), 0.0);
+        let input = components::<D, _>(doubles(self.input(state)));
+        let slope = (&dilatation.slope, dilatation.scales[0]);
+        let strained =
+            exec.collocate_divergence::<D, Double>(body, slope, &self.regions, blocks, input, &mut tension, limits);
+        state.tension[0] = tension;
+        strained
     }
 
     fn switch(&mut self, body: &Body<D>, exec: &mut Exec, slots: &[u32]) {
@@ -280,6 +368,16 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         if let Some(hybrid) = &self.hybrid {
             let input = components::<D, _>(&self.state.displacement);
             self.exec.row_energy::<D, P>(&self.body, &hybrid.row, &hybrid.regions, input, &mut density);
+            if let Some(dilatation) = &hybrid.dilatation {
+                let (slope, mut tension) = ((&dilatation.slope, dilatation.scales[0]), vec![0.0; density.len()]);
+                let (regions, input) = (&hybrid.regions, input.map(doubles));
+                let (body, exec, limits) = (&self.body, &mut self.exec, &Limits::NONE);
+                let blocks = &regions.collocated;
+                exec.collocate_divergence::<D, Double>(body, slope, regions, blocks, input, &mut tension, limits);
+                for (w, p) in doubles_mut(&mut density).iter_mut().zip(tension).filter(|(_, p)| *p != 0.0) {
+                    *w += 0.5 * p * p / dilatation.bulk;
+                }
+            }
         }
         density
     }

@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use super::{Clock, Stage, System, Unknowns};
+use crate::execution::wide;
 use crate::field::Number;
 
 /// Numbers that a thread updates at a time.
@@ -19,16 +20,17 @@ pub struct VelocityVerlet {
 }
 
 impl VelocityVerlet {
-    /// Advances `system` by one step.
-    pub fn step<S: System>(&self, system: &mut S, clock: &mut Clock) {
+    /// Advances `system` by one step. Gives Σ v² over all numbers at its end, before values are prescribed.
+    pub fn step<S: System>(&self, system: &mut S, clock: &mut Clock) -> f64 {
         let (t, dt) = (clock.time(), clock.dt);
         let half = 0.5 * self.damping * dt;
         kick_and_drift(&mut system.unknowns(), dt, 1.0 - half);
         system.constrain(Stage::Drift, t, dt);
         clock.step += 1;
         system.evaluate(clock.time(), dt);
-        kick(&mut system.unknowns(), dt, 1.0 / (1.0 + half));
+        let squares = kick(&mut system.unknowns(), dt, 1.0 / (1.0 + half));
         system.constrain(Stage::Finish, clock.time(), dt);
+        squares
     }
 }
 
@@ -42,30 +44,48 @@ fn kick_and_drift<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, keep: f64)
     if let Some((tau, ahead)) = ahead {
         let tau = T::from_f64(*tau);
         return vectors.zip(ahead.par_chunks_mut(CHUNK)).for_each(|(((u, v), f), ahead)| {
-            for (((u, v), f), ahead) in u.iter_mut().zip(v).zip(f).zip(ahead) {
-                *v = unless_below(slow, keep * *v + factor * *f);
-                *u = unless_below(still, *u + dt * *v);
-                *ahead = *u + tau * *v;
-            }
+            wide(|| {
+                for (((u, v), f), ahead) in u.iter_mut().zip(v).zip(f).zip(ahead) {
+                    *v = unless_below(slow, keep * *v + factor * *f);
+                    *u = unless_below(still, *u + dt * *v);
+                    *ahead = *u + tau * *v;
+                }
+            });
         });
     }
     vectors.for_each(|((u, v), f)| {
-        for ((u, v), f) in u.iter_mut().zip(v).zip(f) {
-            *v = unless_below(slow, keep * *v + factor * *f);
-            *u = unless_below(still, *u + dt * *v);
-        }
+        wide(|| {
+            for ((u, v), f) in u.iter_mut().zip(v).zip(f) {
+                *v = unless_below(slow, keep * *v + factor * *f);
+                *u = unless_below(still, *u + dt * *v);
+            }
+        });
     });
 }
 
-/// v = (v + Δt/2 force/ρ) × after
-fn kick<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, after: f64) {
+/// v = (v + Δt/2 force/ρ) × after; gives Σ v².
+fn kick<T: Number>(unknowns: &mut Unknowns<'_, T>, dt: f64, after: f64) -> f64 {
     let [factor, after] = [0.5 * dt / unknowns.inertia, after].map(T::from_f64);
     let slow = T::from_f64(slow(unknowns.negligible, dt));
-    unknowns.velocity.par_chunks_mut(CHUNK).zip(unknowns.force.par_chunks(CHUNK)).for_each(|(v, f)| {
-        for (v, f) in v.iter_mut().zip(f) {
-            *v = unless_below(slow, (*v + factor * *f) * after);
-        }
+    let chunks = unknowns.velocity.par_chunks_mut(CHUNK).zip(unknowns.force.par_chunks(CHUNK)).map(|(v, f)| {
+        wide(|| {
+            // Eight sums side by side, so that the loop is vectors.
+            let mut squares = [0.0; 8];
+            let (mut vs, mut fs) = (v.chunks_exact_mut(8), f.chunks_exact(8));
+            for (v, f) in (&mut vs).zip(&mut fs) {
+                for k in 0..8 {
+                    v[k] = unless_below(slow, (v[k] + factor * f[k]) * after);
+                    squares[k] += v[k].to_f64() * v[k].to_f64();
+                }
+            }
+            for (k, (v, f)) in vs.into_remainder().iter_mut().zip(fs.remainder()).enumerate() {
+                *v = unless_below(slow, (*v + factor * *f) * after);
+                squares[k] += v.to_f64() * v.to_f64();
+            }
+            squares.iter().sum::<f64>()
+        })
     });
+    chunks.collect::<Vec<f64>>().iter().sum()
 }
 
 /// The velocity that takes 10⁵ steps over a negligible displacement.

@@ -42,7 +42,8 @@ const BAR: Body = Body {
     width: 16.0,
     end: 300.0,
 };
-/// So wide that nothing from the long edges reaches the middle before the echo.
+/// So wide that nothing from the long edges comes to the probe by way of the zone, and so long that nothing from the far end
+/// does, before all of the echo has passed.
 const PLATE: Body = Body {
     dimension: 2,
     low: [-100.0, -80.0, 0.0],
@@ -50,7 +51,7 @@ const PLATE: Body = Body {
     start: -56.0,
     probe: -30.5,
     width: 8.0,
-    end: 95.0,
+    end: 104.0,
 };
 const BLOCK: Body = Body {
     dimension: 3,
@@ -59,7 +60,7 @@ const BLOCK: Body = Body {
     start: -40.0,
     probe: -22.5,
     width: 8.0,
-    end: 70.0,
+    end: 82.0,
 };
 
 impl Body {

@@ -2,8 +2,8 @@
 
 use super::super::model;
 use super::Builder;
-use crate::discretization::collocation::SharedRow;
 use crate::discretization::collocation::gate::{Law, bearable_in_motion};
+use crate::discretization::collocation::{SharedRow, SharedSlope};
 use crate::discretization::moments::ball_moment;
 use crate::discretization::{BondWeights, Collocation, Regions, Scaling};
 use crate::error::{Error, Result};
@@ -14,6 +14,7 @@ use crate::physics::Elasticity;
 use crate::physics::elasticity::State;
 use crate::physics::failure::CriticalStretch;
 use crate::problem::Hybrid;
+use crate::problem::hybrid::Dilatation;
 
 const PATH: &str = "discretization.scheme.hybrid";
 
@@ -34,7 +35,15 @@ impl<const D: usize> Builder<'_, D> {
         let points = settings.points.unwrap_or_else(|| Collocation::fewest::<D>(settings.order));
         let collocation = Collocation { order: settings.order, points, exponent: settings.exponent };
         let refuse = |error: Error| self.refuse(PATH, error.to_string(), "");
-        let kernel = Law::Elastic { influence: scaling.influence, micromodulus: scaling.strength };
+        let (influence, micromodulus) = (scaling.influence, scaling.strength);
+        let solid = physics.state_based.as_ref();
+        let kernel = match solid {
+            None => Law::Elastic { influence, micromodulus },
+            Some(solid) => {
+                let volumetric = solid.moduli.volumetric / (D * D) as f64;
+                Law::StateBased { influence, micromodulus, volumetric }
+            }
+        };
         // Noise may grow tenfold in the run.
         let end_time = self.case.value.solver.stages().map(|(_, solver)| solver.end_time()).fold(0.0, f64::max);
         let bearable = bearable_in_motion(end_time, physics.density);
@@ -59,6 +68,16 @@ impl<const D: usize> Builder<'_, D> {
             gradient: if linear { f64::INFINITY } else { settings.largest_gradient },
         };
         let mut hybrid = Hybrid::new(regions, row, symbol.radius, limits);
+        // A point whose family is whole; without one there are no rows.
+        let inside = body.cloud.slots.iter().copied().find(|&slot| hybrid.regions.has_row(slot as usize));
+        if let (Some(solid), Some(slot)) = (solid, inside) {
+            let [stiffness, bulk] = solid.of(slot as usize);
+            let moment = solid.moduli.deviatoric / stiffness;
+            let per = moment / D as f64;
+            let slope = SharedSlope::new(lattice, &fit, &fit.dilatation(&influence)).map_err(refuse)?;
+            let scales = [solid.moduli.volumetric / (moment * D as f64), per];
+            hybrid.dilatation = Some(Dilatation { slope, scales, bulk });
+        }
         hybrid.damping = settings.damping * unit;
         (hybrid.damps_bonds, hybrid.adaptive) = (settings.damp_bonds, settings.adaptive);
         Ok(hybrid)

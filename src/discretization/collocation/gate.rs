@@ -21,6 +21,8 @@ const EXPONENTS: [f64; 3] = [16.0, 9.0, 4.0];
 pub enum Law {
     /// [`Fit::elastic`], micromodulus in N/m^(2D).
     Elastic { influence: Influence, micromodulus: f64 },
+    /// The same, and [`Fit::dilatation`] with k − A G/D² in Pa.
+    StateBased { influence: Influence, micromodulus: f64, volumetric: f64 },
     /// [`Fit::diffusive`], micro-diffusivity in m^(q−D)/s.
     Diffusive { influence: Influence, micro_diffusivity: f64, q: f64 },
 }
@@ -59,6 +61,12 @@ impl<const D: usize> Fit<D> {
         };
         Ok(match law {
             Law::Elastic { influence, micromodulus } => Symbol::elastic(steps, &self.elastic(influence, *micromodulus)),
+            Law::StateBased { influence, micromodulus, volumetric } => Symbol::state_based(
+                steps,
+                &self.elastic(influence, *micromodulus),
+                &self.dilatation(influence),
+                *volumetric,
+            ),
             Law::Diffusive { influence, micro_diffusivity, q } => {
                 Symbol::diffusive(steps, &self.diffusive(influence, *micro_diffusivity, *q)?)
             }
@@ -86,8 +94,8 @@ impl Collocation {
             return Ok((fit, symbol));
         }
         let name = match law {
-            Law::Elastic { .. } if D == 1 => "E",
-            Law::Elastic { .. } => "C11",
+            Law::Elastic { .. } | Law::StateBased { .. } if D == 1 => "E",
+            Law::Elastic { .. } | Law::StateBased { .. } => "C11",
             Law::Diffusive { .. } => "K",
         };
         let scale = |symbol: &Symbol<D>| (horizon / spacing).powi(2) / symbol.stiffness;

@@ -25,7 +25,7 @@ mod symmetry;
 mod tests;
 
 use bondwise_linear::SingularValues;
-pub use shared_row::{Pair, SharedRow};
+pub use shared_row::{Pair, RowClass, SharedRow, SharedSlope, SlopePair};
 
 pub use symbol::Symbol;
 

@@ -28,6 +28,9 @@ const PEAKS: usize = 8;
 /// each with an error of 2e-16.
 const ROUNDING: f64 = 1e-12;
 
+/// The least and the largest eigenvalue from −4 sin²(k·s/2) and sin(k·s) of each step.
+type Eigenvalues<'a> = dyn Fn(&[f64], &[f64]) -> (f64, f64) + 'a;
+
 /// Extremes of the eigenvalues of a point-symmetric row over all waves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Symbol<const D: usize> {
@@ -51,13 +54,40 @@ impl<const D: usize> Symbol<D> {
     pub fn elastic(steps: &[[i32; D]], weights: &[[[f64; D]; D]]) -> Self {
         let halves = halves(steps, weights.as_flattened().as_flattened());
         let along = |j: usize| weights[halves[j]][0][0];
-        Self::over_waves(&halves.iter().map(|&j| steps[j]).collect::<Vec<_>>(), &along, &|waves| {
+        Self::over_waves(&halves.iter().map(|&j| steps[j]).collect::<Vec<_>>(), &along, &|waves, _| {
             let mut sum = [[0.0; D]; D];
             for (&j, wave) in halves.iter().zip(waves) {
                 (0..D * D).for_each(|n| sum[n / D][n % D] += weights[j][n / D][n % D] * wave);
             }
             extremes(sum)
         })
+    }
+
+    /// Of a state-based solid: `weights` of the bonds as above, and the gradient of the dilatation, `slopes` g and
+    /// `volumetric` k (1/m, Pa): Λ(k) less k ĝ ĝᵀ with ĝ(k) = Σ_j g_j sin(k·s_j).
+    ///
+    /// # Panics
+    /// If the weights at s and −s differ, or slopes are not opposite there.
+    pub fn state_based(steps: &[[i32; D]], weights: &[[[f64; D]; D]], slopes: &[[f64; D]], volumetric: f64) -> Self {
+        let halves = halves(steps, weights.as_flattened().as_flattened());
+        let opposite = |j: usize| steps.iter().position(|step| *step == steps[j].map(|i| -i));
+        let odd = |&j: &usize| opposite(j).is_some_and(|k| slopes[k] == slopes[j].map(|g| -g));
+        assert!(halves.iter().all(odd), "slopes are opposite at opposite steps");
+        // ĝ of long waves along x is k times this.
+        let slope: f64 = steps.iter().zip(slopes).map(|(step, g)| f64::from(step[0]) * g[0]).sum();
+        let bonds = |j: usize| weights[halves[j]][0][0];
+        let along: Vec<[i32; D]> = halves.iter().map(|&j| steps[j]).collect();
+        let mut symbol = Self::over_waves(&along, &bonds, &|waves, sines| {
+            let (mut sum, mut slope) = ([[0.0; D]; D], [0.0; D]);
+            for ((&j, wave), sine) in halves.iter().zip(waves).zip(sines) {
+                (0..D * D).for_each(|n| sum[n / D][n % D] += weights[j][n / D][n % D] * wave);
+                (0..D).for_each(|d| slope[d] += 2.0 * slopes[j][d] * sine);
+            }
+            (0..D * D).for_each(|n| sum[n / D][n % D] -= volumetric * slope[n / D] * slope[n % D]);
+            extremes(sum)
+        });
+        symbol.stiffness += volumetric * slope * slope;
+        symbol
     }
 
     /// Of rows of diffusion; the same of scalars.
@@ -67,7 +97,7 @@ impl<const D: usize> Symbol<D> {
     pub fn diffusive(steps: &[[i32; D]], weights: &[f64]) -> Self {
         let halves = halves(steps, weights);
         let along = |j: usize| weights[halves[j]];
-        Self::over_waves(&halves.iter().map(|&j| steps[j]).collect::<Vec<_>>(), &along, &|waves| {
+        Self::over_waves(&halves.iter().map(|&j| steps[j]).collect::<Vec<_>>(), &along, &|waves, _| {
             let value = halves.iter().zip(waves).map(|(&j, wave)| weights[j] * wave).sum();
             (value, value)
         })
@@ -83,33 +113,33 @@ impl<const D: usize> Symbol<D> {
         self.highest <= bearable.max(ROUNDING * self.radius)
     }
 
-    /// `steps` has one of s and −s; `eigenvalues` gets −4 sin²(k·s/2) of each and returns the least and the largest one.
-    fn over_waves(
-        steps: &[[i32; D]],
-        along_x: &dyn Fn(usize) -> f64,
-        eigenvalues: &dyn Fn(&[f64]) -> (f64, f64),
-    ) -> Self {
+    /// `steps` has one of s and −s; `eigenvalues` gets −4 sin²(k·s/2) and sin(k·s) of each and returns the least and the largest
+    /// one.
+    fn over_waves(steps: &[[i32; D]], along_x: &dyn Fn(usize) -> f64, eigenvalues: &Eigenvalues) -> Self {
         let longest = steps.iter().flatten().map(|i| i.unsigned_abs() as usize).max().unwrap_or(1);
         // Intervals of [0, π]; the shortest wavelength of the symbol is 2π over the longest step.
         let n = (SAMPLES * longest / 2).max(2 * SAMPLES);
-        let mut waves = vec![0.0; steps.len()];
-        let half: Vec<f64> = (0..2 * n).map(|p| -4.0 * (0.5 * PI * p as f64 / n as f64).sin().powi(2)).collect();
+        let (mut waves, mut sines) = (vec![0.0; steps.len()], vec![0.0; steps.len()]);
+        let angle = |p: usize| PI * p as f64 / n as f64;
+        let half: Vec<f64> = (0..2 * n).map(|p| -4.0 * (0.5 * angle(p)).sin().powi(2)).collect();
+        let whole: Vec<f64> = (0..2 * n).map(|p| angle(p).sin()).collect();
         let (mut lows, mut highs) = (Vec::new(), Vec::new());
         for place in ascending::<D>(n) {
-            for (wave, step) in waves.iter_mut().zip(steps) {
+            for ((wave, sine), step) in waves.iter_mut().zip(&mut sines).zip(steps) {
                 let phase: i64 = (0..D).map(|d| place[d] as i64 * i64::from(step[d])).sum();
-                *wave = half[phase.rem_euclid(2 * n as i64) as usize];
+                let phase = phase.rem_euclid(2 * n as i64) as usize;
+                (*wave, *sine) = (half[phase], whole[phase]);
             }
-            let (low, high) = eigenvalues(&waves);
+            let (low, high) = eigenvalues(&waves, &sines);
             lows.push((-low, place));
             highs.push((high, place));
         }
         let mut at = |k: &[f64; D]| {
-            for (wave, step) in waves.iter_mut().zip(steps) {
+            for ((wave, sine), step) in waves.iter_mut().zip(&mut sines).zip(steps) {
                 let phase: f64 = (0..D).map(|d| k[d] * f64::from(step[d])).sum();
-                *wave = -4.0 * (0.5 * phase).sin().powi(2);
+                (*wave, *sine) = (-4.0 * (0.5 * phase).sin().powi(2), phase.sin());
             }
-            eigenvalues(&waves)
+            eigenvalues(&waves, &sines)
         };
         let (radius, _) = climb(lows, PI / n as f64, &mut |k| -at(k).0);
         let (highest, found) = climb(highs, PI / n as f64, &mut |k| at(k).1);
@@ -238,6 +268,8 @@ mod tests {
     use super::*;
     use crate::discretization::{Influence, PartialVolume};
     use crate::field::norm;
+    use crate::physics::elasticity::moduli::Hypothesis;
+    use crate::physics::elasticity::state_based::Moduli;
 
     /// E = δ = 1.
     fn law<const D: usize>() -> Law {
@@ -409,5 +441,29 @@ mod tests {
     #[should_panic(expected = "without point symmetry")]
     fn a_row_that_is_not_symmetric_has_no_symbol() {
         Symbol::diffusive(&[[-2], [1]], &[1.0, 1.0]);
+    }
+
+    #[test]
+    fn long_waves_of_a_state_based_solid_have_the_stiffness_of_any_ratio() {
+        fn check<const D: usize>(points: usize, hypothesis: Hypothesis) {
+            let spacing = 0.25;
+            let fit = Collocation::new(2, points).on_lattice::<D>(spacing, 1.0).unwrap();
+            for poisson in [-0.3, 0.0, 0.2, 0.3, 0.45] {
+                let solid = Moduli::new(hypothesis, 72e9, poisson);
+                let (influence, d) = (Influence::Constant, D as f64);
+                let micromodulus = solid.strength(&influence, 1.0);
+                let volumetric = solid.volumetric / (d * d);
+                let symbol = fit.symbol(&Law::StateBased { influence, micromodulus, volumetric }).unwrap();
+                let stiffness = hypothesis.stiffness_with(72e9, poisson).c11 / (spacing * spacing);
+                assert!((symbol.stiffness / stiffness - 1.0).abs() < 1e-12, "{D}D {poisson}: {symbol:?}");
+                assert!(symbol.is_stable(), "{D}D {poisson}: {symbol:?}");
+                // What is volumetric stiffens or softens all waves.
+                let bonds = fit.symbol(&Law::Elastic { influence, micromodulus }).unwrap();
+                assert!((symbol.radius - bonds.radius) * volumetric >= 0.0, "{D}D {poisson}");
+            }
+        }
+        check::<2>(13, Hypothesis::PlaneStress);
+        check::<2>(29, Hypothesis::PlaneStrain);
+        check::<3>(33, Hypothesis::Solid);
     }
 }

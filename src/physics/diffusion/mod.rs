@@ -249,10 +249,6 @@ impl<const D: usize> BondKernel<D, 1, 1> for Conduction {
     const LINEAR: bool = true;
 
     #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 1]) -> L {
-        L::splat(0.0)
-    }
-    #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, [relative]: &[L; 1], _: L, [sum]: [L; 1]) -> [L; 1] {
         [conductance(bond, self.0).mul_add(*relative, sum)]
     }
@@ -264,10 +260,6 @@ struct Conductance(u32);
 impl<const D: usize> BondKernel<D, 0, 1> for Conductance {
     const RELATIVE: bool = false;
 
-    #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
-        L::splat(0.0)
-    }
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
         [sum + conductance(bond, self.0)]

@@ -75,9 +75,10 @@ impl<L> Elasticity<L> {
     ) where
         L: BondLaw<D>,
     {
-        if let Some(solid) = &self.state_based {
-            let now = state.changing();
-            return solid.evaluate(body, &self.operator.weights, self.failure.as_ref(), exec, now, dt);
+        if self.state_based.is_some() {
+            state.changing().turn();
+            self.extend(body, exec, state, dt, self.failure.as_ref(), hybrid);
+            return self.pull(body, exec, state);
         }
         let (input, output) = (components::<D, _>(&state.displacement), components_mut::<D, _>(&mut state.force));
         let Some(failure) = &self.failure else {
@@ -88,6 +89,32 @@ impl<L> Elasticity<L> {
         let now = self.break_by::<D, P>(body, exec, &mut state.states, input, output, &rule);
         state.broken.bonds += now.bonds;
         state.broken.energy += now.energy;
+    }
+
+    /// The first pass of a state-based solid: [`StateBased::extend`].
+    ///
+    /// # Panics
+    /// If it is of bonds.
+    pub fn extend<const D: usize, P: Packs>(
+        &self,
+        body: &Body<D>,
+        exec: &mut Exec,
+        state: &mut State<P>,
+        dt: f64,
+        failure: Option<&CriticalStretch>,
+        hybrid: Option<&Edge<'_>>,
+    ) {
+        let solid = self.state_based.as_ref().expect(TWO_PASSES);
+        solid.extend(body, &self.operator.weights, failure, exec, &mut state.changing(), dt, hybrid);
+    }
+
+    /// The second: [`StateBased::pull`].
+    ///
+    /// # Panics
+    /// If it is of bonds.
+    pub fn pull<const D: usize, P: Packs>(&self, body: &Body<D>, exec: &mut Exec, state: &mut State<P>) {
+        let solid = self.state_based.as_ref().expect(TWO_PASSES);
+        solid.pull(body, &self.operator.weights, exec, &mut state.changing());
     }
 
     /// Internal force density (N/m³) at given displacements; no bond breaks.
@@ -234,7 +261,7 @@ impl<L> Elasticity<L> {
 }
 
 impl<P: Precision> State<P> {
-    fn changing(&mut self) -> Changing<'_> {
+    pub fn changing(&mut self) -> Changing<'_> {
         Changing {
             displacement: doubles(&self.displacement),
             velocity: doubles(&self.velocity),
@@ -246,13 +273,14 @@ impl<P: Precision> State<P> {
     }
 }
 
+const TWO_PASSES: &str = "only state-based solids have two passes";
 const DOUBLE_ONLY: &str = "state-based solids are of double precision";
 
-fn doubles<F: Number>(field: &[F]) -> &[f64] {
+pub(crate) fn doubles<F: Number>(field: &[F]) -> &[f64] {
     F::doubles(field).expect(DOUBLE_ONLY)
 }
 
-fn doubles_mut<F: Number>(field: &mut [F]) -> &mut [f64] {
+pub(crate) fn doubles_mut<F: Number>(field: &mut [F]) -> &mut [f64] {
     F::doubles_mut(field).expect(DOUBLE_ONLY)
 }
 
@@ -304,10 +332,6 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 1> for Tangent<B> {
     const RELATIVE: bool = false;
 
     #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
-        L::splat(0.0)
-    }
-    #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
         [sum + self.0.tangent(bond.length, bond.weight)]
     }
@@ -319,10 +343,6 @@ struct Diagonal<L>(L);
 impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for Diagonal<B> {
     const RELATIVE: bool = false;
 
-    #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
-        L::splat(0.0)
-    }
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; D]) -> [L; D] {
         let spring = self.0.tangent(bond.length, bond.weight) * bond.inverse_square;
@@ -340,10 +360,6 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for DiagonalRow<B> {
     const RELATIVE: bool = false;
 
     #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
-        L::splat(0.0)
-    }
-    #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; D]) -> [L; D] {
         let spring = self.0.tangent(bond.length, bond.weight) * bond.inverse_square * bond.xi[self.1];
         for d in 0..D {
@@ -359,10 +375,6 @@ struct Weight;
 impl<const D: usize> BondKernel<D, 0, 1> for Weight {
     const RELATIVE: bool = false;
 
-    #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
-        L::splat(0.0)
-    }
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
         [sum + bond.weight]

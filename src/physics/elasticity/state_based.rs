@@ -28,106 +28,25 @@
 //! Two passes a step: the bonds that overstretch break, and S is summed; then the forces, from u, p and q of both ends.
 //! In double precision only.
 
+mod moduli;
+
 use std::any::Any;
 use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use super::Energy;
+pub use moduli::Moduli;
+
 use super::bond_based::{BondBased, BondBasedLinear, FORCE, STRETCH};
-use super::moduli::{Hypothesis, Stiffness, rayleigh_speed_between};
-use crate::discretization::quadrature::integrate;
-use crate::discretization::{BondWeights, Influence};
+use super::{Edge, Energy};
+use crate::discretization::BondWeights;
 use crate::execution::{BreakRule, Broken, Exec};
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates};
 use crate::field::{Double, components, components_mut, dot};
+use crate::geometry::Arrangement;
+use crate::geometry::lattice::BLOCK;
 use crate::lane::{Lane, polynomial};
 use crate::physics::failure::CriticalStretch;
-
-/// The two moduli of a state-based solid, in Pa.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moduli {
-    hypothesis: Hypothesis,
-    /// D² k − A G: 9K − 15G, 4K₂ − 8G, 0.
-    pub volumetric: f64,
-    /// A G: 15 G, 8 G, E.
-    pub deviatoric: f64,
-}
-
-impl Moduli {
-    /// From Young's modulus (Pa) and Poisson's ratio, which a bar has no use for.
-    pub fn new(hypothesis: Hypothesis, young: f64, poisson: f64) -> Self {
-        let Stiffness { c11, c12 } = hypothesis.stiffness_with(young, poisson);
-        let d = hypothesis.dimension() as f64;
-        let shear = 0.5 * (c11 - c12);
-        let deviatoric = if hypothesis == Hypothesis::Bar { young } else { d * (d + 2.0) * shear };
-        // D k = C₁₁ + (D − 1) C₁₂
-        Moduli { hypothesis, volumetric: d * (c11 + (d - 1.0) * c12) - deviatoric, deviatoric }
-    }
-
-    /// The constant c that the bonds are weighted with, 2 A G/∫ ω̃ |ξ| dV: q of a complete family is then ½, and the law
-    /// that of bonds with the micromodulus c where nothing is volumetric. N/m⁶ in 3D; `horizon` in m.
-    pub fn strength(&self, influence: &Influence, horizon: f64) -> f64 {
-        2.0 * self.deviatoric / self.hypothesis.stretch_moment(influence, horizon)
-    }
-
-    /// Energy that a crack takes when each of its bonds breaks at `critical_stretch`, J/m²: that of a body in which all
-    /// bonds across a plane have this stretch and all others none,
-    ///
-    /// ```text
-    /// G₀ = s₀² [(c/4) ∫ ω̃ |ξ| |ξ₁| dV + (D² k − A G) ∫₀^δ φ² dz],   φ(z) = ∫ over ξ₁ > z of ω̃ |ξ| dV/∫ ω̃ |ξ| dV
-    /// ```
-    ///
-    /// with φ the part of S that a point at the distance z from the plane has from beyond it, on both sides of the plane.
-    /// Exact where nothing is volumetric; else bonds that break one after another take somewhat more or less, as the
-    /// others let θ go.
-    pub fn fracture_energy(&self, influence: &Influence, critical_stretch: f64, horizon: f64) -> f64 {
-        let crossing = self.hypothesis.crossing_moment(influence, horizon);
-        let bonds = 0.25 * self.strength(influence, horizon) * crossing;
-        critical_stretch.powi(2) * (bonds + self.volumetric * horizon * self.squared_share(influence))
-    }
-
-    /// The critical stretch of a fracture energy (J/m²): inverse of [`Moduli::fracture_energy`].
-    pub fn critical_stretch(&self, influence: &Influence, fracture_energy: f64, horizon: f64) -> f64 {
-        (fracture_energy / self.fracture_energy(influence, 1.0, horizon)).sqrt()
-    }
-
-    /// Speed of Rayleigh waves, m/s; none in a bar. `density` in kg/m³.
-    pub fn rayleigh_speed(&self, density: f64) -> Option<f64> {
-        let d = self.hypothesis.dimension() as f64;
-        let shear = self.deviatoric / (d * (d + 2.0));
-        // C₁₁ = k + 2 (D − 1) G/D
-        let longitudinal = (self.volumetric + self.deviatoric) / (d * d) + 2.0 * (d - 1.0) / d * shear;
-        let speed = |modulus: f64| (modulus / density).sqrt();
-        (self.hypothesis != Hypothesis::Bar).then(|| rayleigh_speed_between(speed(longitudinal), speed(shear)))
-    }
-
-    /// W of a point with M, S and Σ c ω̃ |ξ| s² β V′.
-    pub(super) fn energy(&self, moment: f64, sum: f64, squares: f64) -> f64 {
-        0.5 * (self.volumetric * (sum / moment).powi(2) + self.deviatoric * squares / moment)
-    }
-
-    /// ∫₀¹ φ² dt, t = z/δ.
-    fn squared_share(&self, influence: &Influence) -> f64 {
-        let d = self.hypothesis.dimension();
-        // The part of a sphere of radius 1 beyond a plane at the distance z.
-        let beyond = |z: f64| match d {
-            1 => 0.5,
-            2 => z.min(1.0).acos() / std::f64::consts::PI,
-            _ => 0.5 * (1.0 - z),
-        };
-        let radial = |t: f64| influence.value(t) * t.powi(d as i32);
-        // With r = t + (1 − t) v² the root of the arc at r = t is smooth.
-        let cap = |t: f64| {
-            let at = |v: f64| {
-                let r = t + (1.0 - t) * v * v;
-                2.0 * (1.0 - t) * v * radial(r) * beyond(t / r)
-            };
-            integrate(at, 0.0, 1.0, 40)
-        };
-        integrate(|t| cap(t).powi(2), 0.0, 1.0, 40) / influence.radial_moment(d as f64).powi(2)
-    }
-}
 
 /// A state-based solid on one body.
 #[derive(Debug, Clone)]
@@ -154,6 +73,13 @@ pub struct Changing<'a> {
     pub tension: &'a mut [Vec<f64>; 2],
 }
 
+impl Changing<'_> {
+    /// Before the first pass of an evaluation: what was p now is p before.
+    pub fn turn(&mut self) {
+        self.tension.swap(0, 1);
+    }
+}
+
 /// Calls a method for the dimension of a body, with the number of values that its second pass has at each end, which stable Rust
 /// cannot derive from D. All that is compiled for the solid is compiled here: once for each dimension and form, whatever
 /// is generic above.
@@ -177,18 +103,25 @@ impl StateBased {
         by_dimension!(body, StateBased::on, moduli, linear, weights)
     }
 
-    /// Breaks the bonds that overstretch, then fills the force density; see
-    /// [`Elasticity::evaluate`](super::Elasticity::evaluate).
-    pub fn evaluate(
+    /// The first pass: breaks the bonds that overstretch, then fills `tension[0]` with p. `hybrid`: the points whose bonds are
+    /// not asked, if any, and which keep their p. What was p before is that of `tension[1]`, see [`turn`].
+    #[allow(clippy::too_many_arguments)] // a sum over bonds, and what may break
+    pub fn extend(
         &self,
         body: &dyn Any,
         weights: &BondWeights,
         failure: Option<&CriticalStretch>,
         exec: &mut Exec,
-        now: Changing<'_>,
+        now: &mut Changing<'_>,
         dt: f64,
+        hybrid: Option<&Edge<'_>>,
     ) {
-        by_dimension!(body, self.evaluate_in, weights, failure, exec, now, dt);
+        by_dimension!(body, self.extend_in, weights, failure, exec, now, dt, hybrid);
+    }
+
+    /// The second pass: fills the force density from displacements and p.
+    pub fn pull(&self, body: &dyn Any, weights: &BondWeights, exec: &mut Exec, now: &mut Changing<'_>) {
+        by_dimension!(body, self.pull_in, weights, exec, now);
     }
 
     /// Force density (N/m³ in 3D) at given displacements; no bond breaks.
@@ -254,34 +187,55 @@ impl StateBased {
         StateBased { moduli, linear, stiffness, bulk, bound }
     }
 
-    fn evaluate_in<const D: usize, const I: usize>(
+    #[allow(clippy::too_many_arguments)] // a sum over bonds, and what may break
+    fn extend_in<const D: usize, const I: usize>(
         &self,
         body: &Body<D>,
         weights: &BondWeights,
         failure: Option<&CriticalStretch>,
         exec: &mut Exec,
-        now: Changing<'_>,
+        now: &mut Changing<'_>,
         dt: f64,
+        hybrid: Option<&Edge<'_>>,
     ) {
-        let Changing { displacement, velocity, force, states, broken, tension } = now;
-        let (u, v) = (components::<D, _>(displacement), components::<D, _>(velocity));
+        let Changing { displacement, velocity, states, broken, tension, .. } = now;
+        let motion = [components::<D, _>(displacement), components::<D, _>(velocity)];
         tension.iter_mut().for_each(|p| p.resize(body.cloud.n_slots(), 0.0));
-        tension.swap(0, 1);
-        let [now, before] = tension;
+        let [now, before] = &mut **tension;
         let mut lost = Vec::new();
         match (failure, self.linear) {
-            (None, _) => self.sum(body, weights, exec, states, u, now),
+            (None, _) => self.sum(body, weights, exec, states, motion[0], now),
             (Some(failure), false) => {
-                broken.bonds += extend(BondBased, body, weights, failure, exec, states, [u, v], now, dt, &mut lost);
+                let rule = Breaking::new(BondBased, failure, motion, dt, hybrid);
+                broken.bonds += extend(rule, body, weights, exec, states, now, &mut lost);
             }
             (Some(failure), true) => {
-                let law = BondBasedLinear;
-                broken.bonds += extend(law, body, weights, failure, exec, states, [u, v], now, dt, &mut lost);
+                let rule = Breaking::new(BondBasedLinear, failure, motion, dt, hybrid);
+                broken.bonds += extend(rule, body, weights, exec, states, now, &mut lost);
             }
         }
-        self.to_tension(now);
+        match (hybrid, &body.cloud.arrangement) {
+            (Some(edge), Arrangement::Lattice(lattice)) => {
+                for &block in &edge.regions.standard {
+                    let slots = lattice.guard + block as usize * BLOCK..lattice.guard + (block as usize + 1) * BLOCK;
+                    now[slots.clone()].iter_mut().zip(&self.bulk[slots]).for_each(|(s, h)| *s *= h);
+                }
+            }
+            _ => self.to_tension(now),
+        }
         broken.energy += self.released(body, lost, (dt != 0.0).then_some(&before[..]), now);
-        self.pull::<D, I>(body, weights, exec, states, &u, now, &mut components_mut::<D, _>(force));
+    }
+
+    fn pull_in<const D: usize, const I: usize>(
+        &self,
+        body: &Body<D>,
+        weights: &BondWeights,
+        exec: &mut Exec,
+        now: &mut Changing<'_>,
+    ) {
+        let Changing { displacement, force, states, tension, .. } = now;
+        let (u, mut force) = (components::<D, _>(displacement), components_mut::<D, _>(force));
+        self.act::<D, I>(body, weights, exec, states, &u, &tension[0], &mut force);
     }
 
     fn force_density_in<const D: usize, const I: usize>(
@@ -296,7 +250,7 @@ impl StateBased {
         let mut tension = vec![0.0; body.cloud.n_slots()];
         self.sum(body, weights, exec, states, axes(displacement), &mut tension);
         self.to_tension(&mut tension);
-        self.pull::<D, I>(body, weights, exec, states, displacement, &tension, force);
+        self.act::<D, I>(body, weights, exec, states, displacement, &tension, force);
     }
 
     fn energy_in<const D: usize, const I: usize>(
@@ -364,6 +318,11 @@ impl StateBased {
         diagonal.iter_mut().flat_map(|d| d.iter_mut()).for_each(|d| *d *= self.bound[1]);
     }
 
+    /// q and h of the point in a slot: 1, and 1/Pa.
+    pub fn of(&self, slot: usize) -> [f64; 2] {
+        [self.stiffness[slot], self.bulk[slot]]
+    }
+
     /// Bytes that it keeps for its points.
     pub fn memory(&self) -> usize {
         4 * size_of_val(&self.stiffness[..])
@@ -394,7 +353,7 @@ impl StateBased {
 
     /// f from u, p and q.
     #[allow(clippy::too_many_arguments)] // a sum over bonds, what it reads and what it writes
-    fn pull<const D: usize, const I: usize>(
+    fn act<const D: usize, const I: usize>(
         &self,
         body: &Body<D>,
         weights: &BondWeights,
@@ -472,23 +431,17 @@ struct Lost {
 }
 
 /// S by slot, after the bonds that overstretch are broken: how many, and which.
-#[allow(clippy::too_many_arguments)]
 fn extend<const D: usize, B: Stretch<D>>(
-    law: B,
+    rule: Breaking<'_, D, B>,
     body: &Body<D>,
     weights: &BondWeights,
-    failure: &CriticalStretch,
     exec: &mut Exec,
     states: &mut BondStates,
-    [displacement, velocity]: [[&[f64]; D]; 2],
     sums: &mut [f64],
-    dt: f64,
     lost: &mut Vec<Lost>,
 ) -> u64 {
-    let kernel = Extension(law);
-    let rule = Breaking { failure, law, displacement, velocity, dt, lost: Mutex::default() };
-    let broken =
-        exec.sum_bonds_and_break::<D, D, 1, Double>(body, weights, states, displacement, [sums], &kernel, &rule);
+    let (kernel, u) = (Extension(rule.law), rule.displacement);
+    let broken = exec.sum_bonds_and_break::<D, D, 1, Double>(body, weights, states, u, [sums], &kernel, &rule);
     *lost = rule.lost.into_inner().expect("no thread has panicked");
     broken.bonds
 }
@@ -581,10 +534,6 @@ impl<const D: usize> BondKernel<D, 0, 1> for Moment {
     const RELATIVE: bool = false;
 
     #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
-        L::splat(0.0)
-    }
-    #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
         [bond.weight.mul_add(bond.length, sum)]
     }
@@ -650,10 +599,6 @@ impl<const D: usize> BondKernel<D, 1, 5> for Row {
     const ADDED: usize = 1;
 
     #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 1]) -> L {
-        L::splat(0.0)
-    }
-    #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, [x]: &[L; 1], _: L, mut sum: [L; 5]) -> [L; 5] {
         sum[0] = bond.spring.mul_add(*x, sum[0]);
         sum[1] = bond.weight.mul_add(*x, sum[1]);
@@ -671,10 +616,6 @@ impl<const D: usize> BondKernel<D, 1, D> for Diagonal {
     const ADDED: usize = 1;
 
     #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 1]) -> L {
-        L::splat(0.0)
-    }
-    #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, [q]: &[L; 1], _: L, mut sum: [L; D]) -> [L; D] {
         let spring = bond.spring * bond.inverse_square * *q;
         for d in 0..D {
@@ -691,7 +632,20 @@ struct Breaking<'a, const D: usize, B> {
     displacement: [&'a [f64]; D],
     velocity: [&'a [f64]; D],
     dt: f64,
+    hybrid: Option<&'a Edge<'a>>,
     lost: Mutex<Vec<Lost>>,
+}
+
+impl<'a, const D: usize, B> Breaking<'a, D, B> {
+    fn new(
+        law: B,
+        failure: &'a CriticalStretch,
+        [displacement, velocity]: [[&'a [f64]; D]; 2],
+        dt: f64,
+        hybrid: Option<&'a Edge<'a>>,
+    ) -> Self {
+        Breaking { failure, law, displacement, velocity, dt, hybrid, lost: Mutex::default() }
+    }
 }
 
 impl<const D: usize, B: Stretch<D>> BreakRule<D> for Breaking<'_, D, B> {
@@ -701,6 +655,7 @@ impl<const D: usize, B: Stretch<D>> BreakRule<D> for Breaking<'_, D, B> {
 
     fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
         strain > self.law.strain_at(self.failure.of(here, there))
+            && self.hybrid.is_none_or(|edge| edge.may_break(here, there))
     }
 
     /// Nothing yet: what a bond takes depends on all that its ends have lost, [`StateBased::released`].
@@ -714,83 +669,5 @@ impl<const D: usize, B: Stretch<D>> BreakRule<D> for Breaking<'_, D, B> {
         let lost = Lost { here: here as u32, there: there as u32, start, end, square: stretch * end };
         self.lost.lock().expect("no thread has panicked").push(lost);
         0.0
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::moduli;
-    use super::*;
-
-    const YOUNG: f64 = 72e9;
-    const HORIZON: f64 = 1e-3;
-
-    fn near(value: f64, expected: f64, tolerance: f64) {
-        assert!((value - expected).abs() < tolerance * expected.abs(), "{value} against {expected}");
-    }
-
-    #[test]
-    fn the_moduli_are_the_printed_ones() {
-        for poisson in [-0.4, 0.0, 0.2, 0.3, 0.45] {
-            let bulk = YOUNG / (3.0 * (1.0 - 2.0 * poisson));
-            let shear = YOUNG / (2.0 * (1.0 + poisson));
-            let solid = Moduli::new(Hypothesis::Solid, YOUNG, poisson);
-            near(solid.deviatoric, 15.0 * shear, 1e-14);
-            near(solid.volumetric + 15.0 * shear, 9.0 * bulk, 1e-14);
-            let stress = YOUNG / (2.0 * (1.0 - poisson));
-            let strain = YOUNG / (2.0 * (1.0 + poisson) * (1.0 - 2.0 * poisson));
-            for (hypothesis, bulk) in [(Hypothesis::PlaneStress, stress), (Hypothesis::PlaneStrain, strain)] {
-                let plane = Moduli::new(hypothesis, YOUNG, poisson);
-                near(plane.deviatoric, 8.0 * shear, 1e-14);
-                near(plane.volumetric + 8.0 * shear, 4.0 * bulk, 1e-14);
-            }
-        }
-        assert_eq!(Moduli::new(Hypothesis::Bar, YOUNG, 0.0).volumetric, 0.0);
-    }
-
-    #[test]
-    fn at_the_ratio_of_bonds_the_constants_are_those_of_bonds() {
-        for hypothesis in Hypothesis::ALL {
-            let solid = Moduli::new(hypothesis, YOUNG, hypothesis.poisson().unwrap_or(0.0));
-            assert!(solid.volumetric.abs() < 1e-14 * solid.deviatoric);
-            for influence in Influence::ALL {
-                let c = moduli::micromodulus(hypothesis, &influence, YOUNG, HORIZON);
-                near(solid.strength(&influence, HORIZON), c, 1e-14);
-                let s0 = moduli::critical_stretch(hypothesis, &influence, c, 3.8, HORIZON);
-                near(solid.critical_stretch(&influence, 3.8, HORIZON), s0, 1e-14);
-            }
-            let expected = moduli::rayleigh_speed(hypothesis, YOUNG, 2440.0);
-            assert_eq!(solid.rayleigh_speed(2440.0).is_some(), expected.is_some());
-            if let (Some(found), Some(expected)) = (solid.rayleigh_speed(2440.0), expected) {
-                near(found, expected, 1e-12);
-            }
-        }
-        // The constants of CabanaPD, with influence functions 1/|ξ| and 1.
-        let solid = Moduli::new(Hypothesis::Solid, YOUNG, 0.25);
-        let s0 = |influence| solid.critical_stretch(&influence, 3.8, HORIZON).powi(2);
-        near(s0(Influence::Constant), 5.0 * 3.8 / (9.0 * 48e9 * HORIZON), 1e-14);
-        near(s0(Influence::Inverted), 8.0 * 3.8 / (15.0 * 48e9 * HORIZON), 1e-14);
-    }
-
-    #[test]
-    fn shares_of_families_beyond_a_plane_are_the_integrals() {
-        // In 3D φ = 1/2 − 2t/3 + t⁴/6 for ω̃ = 1.
-        let solid = Moduli::new(Hypothesis::Solid, YOUNG, 0.3);
-        let exact = 1.0 / 4.0 + 4.0 / 27.0 + 1.0 / 324.0 - 1.0 / 3.0 + 1.0 / 30.0 - 1.0 / 27.0;
-        near(solid.squared_share(&Influence::Constant), exact, 1e-13);
-        // In 2D in Cartesian coordinates: x beyond the plane, y on a half chord.
-        let plane = Moduli::new(Hypothesis::PlaneStress, YOUNG, 0.3);
-        for influence in [Influence::Constant, Influence::Parabolic] {
-            let whole = 2.0 * std::f64::consts::PI * influence.radial_moment(2.0);
-            let cap = |t: f64| {
-                let chord = |x: f64| {
-                    let half = (1.0 - x * x).sqrt();
-                    2.0 * integrate(|y| influence.value(x.hypot(y)) * x.hypot(y), 0.0, half, 40)
-                };
-                // With x = 1 − (1 − t) v² the half chord is smooth at the rim.
-                integrate(|v| 2.0 * (1.0 - t) * v * chord(1.0 - (1.0 - t) * v * v), 0.0, 1.0, 40) / whole
-            };
-            near(plane.squared_share(&influence), integrate(|t| cap(t).powi(2), 0.0, 1.0, 40), 1e-6);
-        }
     }
 }

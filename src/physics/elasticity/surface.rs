@@ -148,10 +148,6 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 3> for Squares<B> {
     const RELATIVE: bool = false;
 
     #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
-        L::splat(0.0)
-    }
-    #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; 3]) -> [L; 3] {
         let spring = self.0.tangent(bond.length, bond.weight);
         for d in 0..D {
@@ -167,10 +163,6 @@ struct UnitStrain<L>(L);
 impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 4> for UnitStrain<B> {
     const RELATIVE: bool = false;
 
-    #[inline(always)]
-    fn strain<L: Lane>(&self, _: &Bond<D, L>, _: &[L; 0]) -> L {
-        L::splat(0.0)
-    }
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; 4]) -> [L; 4] {
         let spring = self.0.tangent(bond.length, bond.weight);

@@ -1,0 +1,131 @@
+//! Tables of what is written.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Something to write.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Output {
+    /// Files for ParaView, one a frame, and the collection that plays them.
+    Vtu(Vtu),
+    /// PNG pictures of a field.
+    Picture(Picture),
+    /// Rows of the table of energies, momenta and reactions; every 20 steps if not given.
+    History(History),
+    /// The fields at the point nearest to a place, as a table.
+    Probe(Probe),
+    /// The crack tip: the damaged point farthest along a direction.
+    CrackTip(CrackTip),
+}
+
+/// VTU frames.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Vtu {
+    /// Time between frames. Either this or `every_steps`; the first and the last instant are always written.
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
+    pub every: Option<f64>,
+    #[schemars(range(min = 1))]
+    pub every_steps: Option<u64>,
+    /// Fields; displacement and damage if not given.
+    #[serde(default)]
+    pub fields: Vec<FieldName>,
+}
+
+/// Names of fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FieldName {
+    /// u, m
+    Displacement,
+    /// m/s
+    Velocity,
+    /// Internal force and load, N/m³
+    Force,
+    /// φ, 0 whole to 1 free of all bonds
+    Damage,
+    /// W, J/m³
+    StrainEnergy,
+    /// 1 where bonds are summed, 0 where a point has a row of collocation
+    Scheme,
+}
+
+/// PNG pictures.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Picture {
+    pub field: FieldName,
+    /// Component of a vector field; its magnitude if not given.
+    #[schemars(range(min = 0, max = 2))]
+    pub component: Option<usize>,
+    /// Time between pictures. At most one of `every`, `every_steps`, `at`; without any, the last instant alone.
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
+    pub every: Option<f64>,
+    #[schemars(range(min = 1))]
+    pub every_steps: Option<u64>,
+    /// Times of pictures.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "s"))]
+    pub at: Vec<f64>,
+    /// Displacements are drawn this many times as large; 1 if not given.
+    #[serde(default = "super::one")]
+    pub deform: f64,
+    /// Ends of the colour bar; those of the field if not given.
+    #[schemars(length(min = 2, max = 2))]
+    pub range: Option<Vec<f64>>,
+    /// Pixels.
+    #[serde(default = "picture_width")]
+    #[schemars(range(min = 200, max = 8000))]
+    pub width: u32,
+    /// 3D: azimuth and elevation of the eye, degrees.
+    #[schemars(length(min = 2, max = 2))]
+    pub view: Option<Vec<f64>>,
+    /// 3D: draw only points where the field is at least this.
+    pub above: Option<f64>,
+}
+
+fn picture_width() -> u32 {
+    1200
+}
+
+/// The history table.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct History {
+    #[schemars(range(min = 1))]
+    pub every_steps: u64,
+}
+
+/// A probe.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// The table is written as `probe_<name>.csv`.
+    pub name: String,
+    /// A place; the nearest point is probed.
+    #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
+    pub at: Vec<f64>,
+    /// Fields; displacement and velocity if not given.
+    #[serde(default)]
+    pub fields: Vec<FieldName>,
+    #[schemars(range(min = 1))]
+    pub every_steps: u64,
+}
+
+/// The crack tip.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CrackTip {
+    /// The direction along which the farthest damaged point is the tip.
+    #[schemars(length(min = 1, max = 3))]
+    pub along: Vec<f64>,
+    /// A point is damaged when φ passes this; 0.35 if not given.
+    #[serde(default = "damaged")]
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    pub threshold: f64,
+}
+
+fn damaged() -> f64 {
+    0.35
+}

@@ -1,0 +1,141 @@
+//! Tables of the physics: laws and failure.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the body is made of.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Physics {
+    pub elasticity: Elasticity,
+}
+
+/// An elastic solid that may break.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Elasticity {
+    pub law: Law,
+    /// Without it, bonds never break.
+    pub failure: Option<Failure>,
+}
+
+/// Laws of elasticity.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Law {
+    /// Bond-based, with large displacements (prototype microelastic brittle).
+    BondBased(BondBased),
+    /// Bond-based, linearised: small displacements and rotations only.
+    BondBasedLinear(BondBased),
+    /// State-based, with large displacements (linear peridynamic solid): any Poisson ratio.
+    StateBased(StateBased),
+    /// State-based, linearised: small displacements and rotations only.
+    StateBasedLinear(StateBased),
+}
+
+impl Law {
+    /// The name of the law in a case.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Law::BondBased(_) => "bond_based",
+            Law::BondBasedLinear(_) => "bond_based_linear",
+            Law::StateBased(_) => "state_based",
+            Law::StateBasedLinear(_) => "state_based_linear",
+        }
+    }
+
+    pub fn is_state_based(&self) -> bool {
+        matches!(self, Law::StateBased(_) | Law::StateBasedLinear(_))
+    }
+
+    /// What all laws are given.
+    pub fn parameters(&self) -> BondBased {
+        match self {
+            Law::BondBased(p) | Law::BondBasedLinear(p) => p.clone(),
+            Law::StateBased(p) | Law::StateBasedLinear(p) => {
+                BondBased { young: p.young, density: p.density, poisson: p.poisson, plane: p.plane }
+            }
+        }
+    }
+}
+
+/// Parameters of the bond-based laws.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BondBased {
+    /// Young's modulus E.
+    #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0))]
+    pub young: f64,
+    /// Density ρ.
+    #[schemars(extend("x-unit" = "kg/m^3", "exclusiveMinimum" = 0))]
+    pub density: f64,
+    /// May be given, but the theory fixes it: 1/3 in plane stress, 1/4 in plane strain and in 3D.
+    pub poisson: Option<f64>,
+    /// 2D only: plane stress (default) or plane strain.
+    pub plane: Option<Plane>,
+}
+
+/// Parameters of the state-based laws. Their influence function ω̃ is that of the bond-based laws: bonds are weighted with
+/// ω = ω̃ δ/|ξ| in the weighted volume, so that `constant` is the usual 1/|ξ| and `inverted` the usual 1.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StateBased {
+    /// Young's modulus E.
+    #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0))]
+    pub young: f64,
+    /// Density ρ.
+    #[schemars(extend("x-unit" = "kg/m^3", "exclusiveMinimum" = 0))]
+    pub density: f64,
+    /// Poisson's ratio ν: above -1 and below 1/2, in plane stress below 1. Needed in 2D and 3D; in 1D there is none.
+    #[schemars(extend("x-unit" = ""))]
+    pub poisson: Option<f64>,
+    /// 2D only: plane stress (default) or plane strain.
+    pub plane: Option<Plane>,
+}
+
+/// Hypotheses of two-dimensional elasticity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Plane {
+    Stress,
+    Strain,
+}
+
+/// When bonds break.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Failure {
+    /// A bond breaks, for good, when its stretch passes s₀.
+    CriticalStretch(CriticalStretch),
+}
+
+/// The critical stretch, given or from the fracture energy.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CriticalStretch {
+    /// G₀: energy to open a unit of crack area. Either this or `stretch`.
+    #[schemars(extend("x-unit" = "J/m^2", "exclusiveMinimum" = 0))]
+    pub fracture_energy: Option<f64>,
+    /// s₀. Either this or `fracture_energy`.
+    #[schemars(extend("x-unit" = "", "exclusiveMinimum" = 0))]
+    pub stretch: Option<f64>,
+    /// Bonds that touch a point of these sets never break.
+    #[serde(default)]
+    pub no_fail: Vec<String>,
+    /// Other values inside a set or across two sets; later entries win.
+    #[serde(default)]
+    pub pairs: Vec<FailurePair>,
+}
+
+/// A critical stretch for the bonds between two sets.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FailurePair {
+    /// Two set names; the same name twice for bonds within a set.
+    #[schemars(length(min = 2, max = 2))]
+    pub between: Vec<String>,
+    #[schemars(extend("x-unit" = "J/m^2", "exclusiveMinimum" = 0))]
+    pub fracture_energy: Option<f64>,
+    #[schemars(extend("x-unit" = "", "exclusiveMinimum" = 0))]
+    pub stretch: Option<f64>,
+}
