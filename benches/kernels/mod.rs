@@ -1,13 +1,16 @@
 //! The sums over bonds that are timed and counted: each by its name, on a body of the asked size.
 
-use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
-use bondwise::execution::{Exec, Instructions, Packs};
-use bondwise::family::{Body, BondLaw};
-use bondwise::field::{Double, Mixed, Number, Single, components_mut};
-use bondwise::geometry::{Cloud, Shape};
+use bondwise::discretization::collocation::SharedRow;
+use bondwise::discretization::{Collocation, Influence, Operator, PartialVolume, Regions, standard};
+use bondwise::execution::{Exec, Instructions, Limits, Packs};
+use bondwise::family::{Body, BondLaw, BondStates};
+use bondwise::field::{Double, Mixed, Number, Single, components, components_mut};
+use bondwise::geometry::{Arrangement, Cloud, Shape};
 use bondwise::physics::Elasticity;
 use bondwise::physics::elasticity::State;
 use bondwise::physics::elasticity::bond_based::{BondBased, BondBasedLinear};
+use bondwise::physics::elasticity::moduli::Hypothesis;
+use bondwise::physics::elasticity::state_based::{Moduli, StateBased};
 use bondwise::physics::failure::CriticalStretch;
 
 /// Points along the edges of the bodies.
@@ -39,11 +42,13 @@ enum What {
     ExactForce,
     /// The strain energy density.
     Energy,
+    /// Forces of a state-based solid, small form.
+    TwoPasses,
 }
 
 /// All kernels: what, law, path and dimension, precision.
 #[rustfmt::skip] // a table
-pub const KERNELS: [(&str, Maker); 26] = [
+pub const KERNELS: [(&str, Maker); 30] = [
     ("force/bond_based/lattice2d/double", |e, i| plate::<_, Double>(BondBased, What::Force, e, i)),
     ("force/bond_based/lattice2d/single", |e, i| plate::<_, Single>(BondBased, What::Force, e, i)),
     ("force/bond_based/lattice2d/mixed", |e, i| plate::<_, Mixed>(BondBased, What::Force, e, i)),
@@ -70,6 +75,10 @@ pub const KERNELS: [(&str, Maker); 26] = [
     ("exact_force/bond_based/cloud3d/double", |e, i| cloud::<_, Double>(BondBased, What::ExactForce, e, i)),
     ("energy/bond_based/lattice3d/double", |e, i| solid::<_, Double>(BondBased, What::Energy, e, i)),
     ("energy/bond_based/cloud3d/double", |e, i| cloud::<_, Double>(BondBased, What::Energy, e, i)),
+    ("force/state_based/lattice3d/double", |e, i| solid::<_, Double>(BondBased, What::TwoPasses, e, i)),
+    ("force/state_based/cloud3d/double", |e, i| cloud::<_, Double>(BondBased, What::TwoPasses, e, i)),
+    ("collocation/bond_based/lattice2d/double", |e, i| collocation(filled(e.plate), 13, i)),
+    ("collocation/bond_based/lattice3d/double", |e, i| collocation(filled(e.solid), 33, i)),
 ];
 
 /// The kernel of a name, if there is one.
@@ -116,7 +125,9 @@ fn on_body<const D: usize, L: BondLaw<D> + 'static, P: Packs>(
     let body: Body<D> = standard::body(points, 3.015 * SPACING, PartialVolume::None);
     let operator = Operator::standard(&body, 1.0, Influence::Constant, PartialVolume::None);
     let failure = (what != What::Unbreakable).then(|| CriticalStretch::uniform(0.1));
-    let physics = Elasticity { law, density: 1.0, operator, failure, state_based: None };
+    let solid = Moduli::new(Hypothesis::Solid, 1.0, 0.3);
+    let state_based = (what == What::TwoPasses).then(|| StateBased::new(solid, L::LINEAR, &body, &operator.weights));
+    let physics = Elasticity { law, density: 1.0, operator, failure, state_based };
     let mut state: State<P> = physics.initial_state(&body);
     // Strains up to 0.1 %, or 3 %: those of the first are below the 1 % up to which small forms serve.
     let stretch = if what == What::ExactForce { 3e-2 } else { 1e-3 };
@@ -131,7 +142,35 @@ fn on_body<const D: usize, L: BondLaw<D> + 'static, P: Packs>(
     let mut density = vec![P::Field::default(); body.cloud.n_slots()];
     let evaluate = move || match what {
         What::Energy => physics.strain_energy_density(&body, &mut exec, &state, &mut density),
-        What::Force | What::ExactForce | What::Unbreakable => physics.evaluate(&body, &mut exec, &mut state, 0.0, None),
+        What::Force | What::ExactForce | What::Unbreakable | What::TwoPasses => {
+            physics.evaluate(&body, &mut exec, &mut state, 0.0, None)
+        }
+    };
+    Kernel { bonds, evaluate: Box::new(evaluate) }
+}
+
+/// Rows of order 2 at all points whose family is whole, with their look at the strain; nodes are counted as bonds.
+fn collocation<const D: usize>(points: Cloud<D>, nodes: usize, instructions: Instructions) -> Kernel {
+    let body: Body<D> = standard::body(points, 3.0 * SPACING, PartialVolume::Ramp);
+    let Arrangement::Lattice(lattice) = &body.cloud.arrangement else { unreachable!("it was made as one") };
+    let fit = Collocation::new(2, nodes).on_lattice::<D>(SPACING, 3.0 * SPACING).expect("as many nodes as it takes");
+    let row = SharedRow::new(lattice, &fit, &fit.elastic(&Influence::Constant, 1.0)).expect("it is of this lattice");
+    let regions = Regions::new(&body, &BondStates::whole(&body), std::iter::empty(), 1);
+    let n = body.cloud.n_slots();
+    let mut displacement = vec![0.0; D * n];
+    for &slot in &body.cloud.slots {
+        let x = body.cloud.position(slot as usize);
+        for (d, u) in components_mut::<D, _>(&mut displacement).into_iter().enumerate() {
+            u[slot as usize] = 1e-3 * x[d] / (d + 1) as f64;
+        }
+    }
+    let mut force = vec![0.0; D * n];
+    let mut exec = Exec::on(instructions);
+    let limits = Limits { strain: 0.01, linear: false, gradient: 0.02 };
+    let bonds = (regions.collocated_points() * row.n_nodes()) as u64;
+    let evaluate = move || {
+        let (input, output) = (components::<D, _>(&displacement), components_mut::<D, _>(&mut force));
+        exec.collocate::<D, Double>(&body, &row, &regions, &regions.collocated, input, output, &limits);
     };
     Kernel { bonds, evaluate: Box::new(evaluate) }
 }
