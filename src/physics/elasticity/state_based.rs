@@ -104,7 +104,7 @@ impl StateBased {
     }
 
     /// The first pass: breaks the bonds that overstretch, then fills `tension[0]` with p. `hybrid`: the points whose bonds are
-    /// not asked, if any, and which keep their p. What was p before is that of `tension[1]`, see [`turn`].
+    /// not asked, if any, and which keep their p. What was p before is that of `tension[1]`, see [`Changing::turn`].
     #[allow(clippy::too_many_arguments)] // a sum over bonds, and what may break
     pub fn extend(
         &self,
