@@ -13,6 +13,8 @@ pub trait Number:
 {
     fn from_f64(x: f64) -> Self;
     fn to_f64(self) -> f64;
+    /// |x| < limit
+    fn is_below(self, limit: Self) -> bool;
     /// Its bytes, the lowest first.
     fn bytes(self) -> impl AsRef<[u8]>;
     /// A field as one of double precision, if it is that.
@@ -43,6 +45,10 @@ impl Number for f64 {
     fn to_f64(self) -> f64 {
         self
     }
+    #[inline(always)]
+    fn is_below(self, limit: Self) -> bool {
+        self.abs() < limit
+    }
     fn bytes(self) -> impl AsRef<[u8]> {
         self.to_le_bytes()
     }
@@ -57,6 +63,10 @@ impl Number for f32 {
     #[inline(always)]
     fn to_f64(self) -> f64 {
         f64::from(self)
+    }
+    #[inline(always)]
+    fn is_below(self, limit: Self) -> bool {
+        self.abs() < limit
     }
     fn bytes(self) -> impl AsRef<[u8]> {
         self.to_le_bytes()

@@ -27,7 +27,7 @@ use crate::physics::elasticity::{Elasticity, State};
 use crate::physics::failure::CriticalStretch;
 use crate::solver::runge_kutta::Memory;
 use crate::solver::statics::LoadStep;
-use crate::solver::{Clock, Solver, Stage, Staged, System, Unknowns};
+use crate::solver::{Clock, Drift, Solver, Stage, Staged, System, Unknowns, VelocityVerlet};
 
 /// One body, what it is made of, what acts on it, and where it stands.
 pub struct Problem<const D: usize, L, P: Precision = Double> {
@@ -42,6 +42,8 @@ pub struct Problem<const D: usize, L, P: Precision = Double> {
     pub n_bonds: u64,
     pub n_cut: u64,
     exec: Exec,
+    /// The solver and the step (s) whose last kick velocities have not had yet.
+    owed: Option<(VelocityVerlet, f64)>,
     ledger: Ledger,
     /// c of the solver in use, 1/s: the books need it.
     damping: f64,
@@ -138,6 +140,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             n_bonds,
             n_cut,
             exec,
+            owed: None,
             ledger,
             damping: 0.0,
             stages: Memory::default(),
@@ -200,6 +203,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
     /// Motion that begins at once, by a prescribed velocity, is work and impulse from outside; motion that a static solver
     /// stops is booked as taken by damping, its momentum as an impulse.
     pub fn hand_over(&mut self, solver: &Solver, t: f64) {
+        self.catch_up();
         self.is_static = solver.is_static();
         let before = self.motion();
         if self.is_static {
@@ -222,6 +226,10 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
 
     /// One step of a solver in time, then the watch over its result; or a load step of a static solver, of which `observe`
     /// is told: see [`Statics::solve`](crate::solver::Statics::solve). False when it was interrupted.
+    ///
+    /// Where a step of velocity Verlet can leave its last kick to the next, velocities in `state` lack it until
+    /// [`catch_up`](Self::catch_up), which all that asks for velocities and energies here does; the watch is then over the
+    /// motion at the end of the step before.
     pub fn step(
         &mut self,
         solver: &Solver,
@@ -232,23 +240,25 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             Solver::Statics(statics) => return self.settle(statics, clock, observe),
             Solver::VelocityVerlet(verlet) => {
                 self.damping = verlet.damping;
-                let squares = verlet.step(self, clock);
-                let ledger = &mut self.ledger;
-                match &self.body.cloud.arrangement {
-                    Arrangement::Lattice(lattice) if verlet.damping == 0.0 && self.prescribed.is_empty() => {
-                        ledger.kinetic = 0.5 * self.physics.density * lattice.cell_volume() * squares;
+                let on_lattice = matches!(self.body.cloud.arrangement, Arrangement::Lattice(_));
+                if on_lattice && verlet.damping == 0.0 && self.prescribed.is_empty() {
+                    let owed = self.owed.is_some();
+                    let squares = verlet.stride(self, clock, owed);
+                    if owed {
+                        self.book_motion(squares);
                     }
-                    _ => {
-                        let last = (ledger.kinetic, ledger.momentum);
-                        let (kinetic, momentum) = self.motion();
-                        let ledger = &mut self.ledger;
-                        // Damping takes ρ c v² a second, and ρ c v of momentum: trapezoidal in time, as the forces.
-                        ledger.damped += verlet.damping * clock.dt * (last.0 + kinetic);
-                        for d in 0..3 {
-                            ledger.impulse[d] -= 0.5 * verlet.damping * clock.dt * (last.1[d] + momentum[d]);
-                        }
-                        (ledger.kinetic, ledger.momentum) = (kinetic, momentum);
+                    self.owed = Some((*verlet, clock.dt));
+                } else {
+                    verlet.step(self, clock);
+                    let last = (self.ledger.kinetic, self.ledger.momentum);
+                    let (kinetic, momentum) = self.motion();
+                    let ledger = &mut self.ledger;
+                    // Damping takes ρ c v² a second, and ρ c v of momentum: trapezoidal in time, as the forces.
+                    ledger.damped += verlet.damping * clock.dt * (last.0 + kinetic);
+                    for d in 0..3 {
+                        ledger.impulse[d] -= 0.5 * verlet.damping * clock.dt * (last.1[d] + momentum[d]);
                     }
+                    (ledger.kinetic, ledger.momentum) = (kinetic, momentum);
                 }
             }
             Solver::RungeKutta(method) => {
@@ -267,6 +277,26 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         Ok(true)
     }
 
+    /// Gives velocities the last kick of the last step, which the next would make up for in passing.
+    pub fn catch_up(&mut self) {
+        if let Some((verlet, dt)) = self.owed.take() {
+            let squares = verlet.finish(self, dt);
+            self.book_motion(squares);
+        }
+    }
+
+    /// The kinetic energy that belongs to Σ v² on a lattice.
+    fn book_motion(&mut self, squares: f64) {
+        let volume = self.body.cloud.spacing.powi(D as i32);
+        self.ledger.kinetic = 0.5 * self.physics.density * volume * squares;
+    }
+
+    /// At the end of a run: catches up, and watches over the result of its last step.
+    pub fn conclude(&mut self, solver: &Solver, clock: &Clock) -> Result<()> {
+        self.catch_up();
+        self.watch(solver, clock)
+    }
+
     /// Adds the loads of time `t` to the force density. Gives the work and impulse of each over the last `dt`, by the
     /// trapezoidal rule.
     fn load(&mut self, t: f64, dt: f64) -> Vec<Done> {
@@ -277,6 +307,15 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             load.apply(t, dt, u, force, |slot| cloud.volume(slot))
         };
         self.loads.iter_mut().map(apply).collect()
+    }
+
+    /// The same, booked.
+    fn load_and_book(&mut self, t: f64, dt: f64) {
+        let done = self.load(t, dt);
+        for (load, done) in self.loads.iter().zip(done) {
+            self.ledger.external += done.work;
+            self.ledger.impulse[load.component] += done.impulse;
+        }
     }
 
     /// Kinetic energy and momentum.
@@ -362,6 +401,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
 
     /// The energies and momenta now.
     pub fn balance(&mut self) -> Balance {
+        self.catch_up();
         let density = self.strain_energy();
         let (cloud, rho) = (&self.body.cloud, self.physics.density);
         let v = components::<D, _>(&self.state.velocity);
@@ -423,6 +463,9 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
     }
 
     fn field_of(&mut self, name: &str, points: Range<usize>) -> Option<Field> {
+        if name == "velocity" {
+            self.catch_up();
+        }
         let damage = if name == "damage" { self.damage() } else { Vec::new() };
         let density = if name == "strain_energy" { self.strain_energy() } else { Vec::new() };
         let slots = &self.body.cloud.slots[points];
@@ -456,7 +499,8 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
     }
 
     /// BLAKE3 of displacements, velocities and bond states: equal exactly when two runs have the same bits.
-    pub fn hash(&self) -> String {
+    pub fn hash(&mut self) -> String {
+        self.catch_up();
         let mut hasher = blake3::Hasher::new();
         for flat in [&self.state.displacement, &self.state.velocity] {
             for component in components::<D, _>(flat) {
@@ -580,11 +624,15 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> System for Problem<D, L, P> {
 
     fn evaluate(&mut self, t: f64, dt: f64) {
         self.evaluate_bonds(dt);
-        let done = self.load(t, dt);
-        for (load, done) in self.loads.iter().zip(done) {
-            self.ledger.external += done.work;
-            self.ledger.impulse[load.component] += done.impulse;
-        }
+        self.load_and_book(t, dt);
+    }
+
+    fn evaluate_behind(&mut self, drift: &Drift<P::Field>, t: f64, dt: f64) -> Option<f64> {
+        let Problem { body, physics, state, exec, hybrid, prescribed, .. } = self;
+        let hybrid = hybrid.as_mut().filter(|hybrid| prescribed.is_empty() && hybrid.evaluates_behind())?;
+        let squares = hybrid.evaluate_behind(drift, physics, body, exec, state, dt);
+        self.load_and_book(t, dt);
+        Some(squares)
     }
 
     fn stable_step(&self) -> f64 {

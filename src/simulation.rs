@@ -37,6 +37,10 @@ pub trait Stepper: Source + Send {
     ) -> Result<bool>;
     /// Hands the body over to another solver at time `t`, s.
     fn hand_over(&mut self, solver: &Solver, t: f64);
+    /// Ends a run: whether the numbers of its last step are sound.
+    fn conclude(&mut self, _solver: &Solver, _clock: &Clock) -> Result<()> {
+        Ok(())
+    }
     /// What the load steps of static solvers took.
     fn load_steps(&self) -> &[LoadStep];
     /// Takes a step that nobody observes.
@@ -133,6 +137,9 @@ impl Simulation {
                 interrupted = self.clock.step < self.n_steps;
                 break;
             }
+        }
+        if stop.is_none() {
+            stop = self.model.conclude(&self.solver, &self.clock).err();
         }
         self.write(&mut desk, true)?;
         let status = match (&stop, interrupted) {
@@ -391,7 +398,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Source for Model<D, L, P> {
     fn hybrid(&self) -> Option<Work> {
         self.problem.hybrid()
     }
-    fn hash(&self) -> String {
+    fn hash(&mut self) -> String {
         self.problem.hash()
     }
     fn family_sizes(&self) -> Vec<u32> {
@@ -427,6 +434,9 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Stepper for Model<D, L, P> {
     }
     fn hand_over(&mut self, solver: &Solver, t: f64) {
         self.problem.hand_over(solver, t);
+    }
+    fn conclude(&mut self, solver: &Solver, clock: &Clock) -> Result<()> {
+        self.problem.conclude(solver, clock)
     }
     fn load_steps(&self) -> &[LoadStep] {
         &self.problem.load_steps
@@ -476,7 +486,7 @@ mod tests {
         fn reactions(&self) -> Vec<(String, f64)> {
             Vec::new()
         }
-        fn hash(&self) -> String {
+        fn hash(&mut self) -> String {
             String::new()
         }
         fn family_sizes(&self) -> Vec<u32> {

@@ -5,7 +5,7 @@ use bondwise::case::model::Case;
 use bondwise::case::read_text;
 use bondwise::discretization::collocation::{SharedRow, SharedSlope};
 use bondwise::discretization::{Collocation, Influence, PartialVolume, Regions, standard};
-use bondwise::execution::{Exec, Instructions, Limits, Packs};
+use bondwise::execution::{Exec, Instructions, Limits, Motion, Packs};
 use bondwise::family::BondStates;
 use bondwise::field::{Double, Field, Mixed, Number, Single, Values, components, components_mut};
 use bondwise::geometry::{Arrangement, Cloud, Shape};
@@ -122,6 +122,76 @@ fn rows_are_the_plain_sums_on_every_set_of_instructions() {
     compare_rows::<2, Single>([45.0, 20.0], 13, 5e-6);
     compare_rows::<2, Mixed>([45.0, 20.0], 13, 5e-6);
     compare_rows::<3, Double>([35.0, 14.0, 13.0], 33, 1e-14);
+}
+
+/// Rows that follow a motion slab by slab, beside all motion and then all rows.
+fn compare_behind<const D: usize, P: Packs>(cells: [f64; D], points: usize) {
+    let shape = Shape::Box { low: [0.0; D], high: cells.map(|n| n * H) };
+    let body = standard::body(Cloud::lattice(&shape, H, 5), 4.0 * H, PartialVolume::Ramp);
+    let Arrangement::Lattice(lattice) = &body.cloud.arrangement else { unreachable!() };
+    let fit = Collocation { order: 2, points, exponent: 9.0 }.on_lattice::<D>(H, 4.0 * H).unwrap();
+    let row = SharedRow::new(lattice, &fit, &fit.elastic(&Influence::Constant, 1e20)).unwrap();
+    let few = body.cloud.slots.iter().copied().filter(|slot| slot % 997 == 3);
+    let regions = Regions::new(&body, &BondStates::whole(&body), few, 1);
+    let n = body.cloud.n_slots();
+    assert!(n > 4 * 4096 && !regions.mixed.is_empty());
+    let mut random = ChaCha8Rng::seed_from_u64(8);
+    let mut field = || -> Vec<P::Field> {
+        let unit = |_| (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
+        (0..D * n).map(unit).map(|unit| P::Field::from_f64(2e-2 * H * (unit - 0.5))).collect()
+    };
+    let (before, old) = ([field(), field()], field());
+    let limits = Limits { strain: 0.012, linear: false, gradient: 0.035 };
+    // The velocity takes up the force, and the displacement a part of both.
+    let pass = |u: &mut [P::Field], v: &mut [P::Field], f: &[P::Field], ahead: &mut [P::Field]| -> f64 {
+        let part = P::Field::from_f64(0.25);
+        let mut sum = 0.0;
+        for (((u, v), f), ahead) in u.iter_mut().zip(v).zip(f).zip(ahead) {
+            *v = *v + part * *f;
+            *u = *u + part * *v;
+            *ahead = *u + part * *v;
+            sum += v.to_f64().powi(2);
+        }
+        sum
+    };
+    let [mut u, mut v] = before.clone();
+    let (mut force, mut ahead) = (old.clone(), vec![P::Field::default(); D * n]);
+    let squares = pass(&mut u, &mut v, &force, &mut ahead);
+    let (input, output) = (components::<D, _>(&ahead), components_mut::<D, _>(&mut force));
+    let mut beyond =
+        Exec::default().collocate::<D, P>(&body, &row, &regions, &regions.collocated, input, output, &limits);
+    beyond.sort_unstable();
+    assert!(!beyond.is_empty());
+    let mut reference = None;
+    for threads in [1, 2, 3, 64] {
+        let [mut u_behind, mut v_behind] = before.clone();
+        let (mut force_behind, mut ahead_behind) = (old.clone(), vec![P::Field::default(); D * n]);
+        let motion = Motion {
+            displacement: &mut u_behind,
+            velocity: &mut v_behind,
+            force: &mut force_behind,
+            ahead: &mut ahead_behind,
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
+        let (mut found, sum) = pool.install(|| {
+            let pass = |m: Motion<'_, P::Field>| pass(m.displacement, m.velocity, m.force, m.ahead);
+            Exec::default().collocate_behind::<D, P>(&body, &row, &regions, motion, &limits, &pass)
+        });
+        found.sort_unstable();
+        assert!((u_behind, v_behind, ahead_behind) == (u.clone(), v.clone(), ahead.clone()), "{D}D: motion");
+        assert!(force_behind == force && found == beyond, "{D}D on {threads} threads: rows");
+        // Sums of as many squares, in another order.
+        assert!((sum / squares - 1.0).abs() < 1e-12, "{sum} {squares}");
+        assert_eq!(sum, *reference.get_or_insert(sum));
+    }
+}
+
+#[test]
+fn rows_behind_a_motion_are_those_after_it() {
+    compare_behind::<1, Double>([30e3], 5);
+    compare_behind::<2, Double>([180.0, 110.0], 29);
+    compare_behind::<2, Single>([110.0, 180.0], 29);
+    compare_behind::<3, Double>([40.0, 30.0, 24.0], 33);
 }
 
 /// Slopes of a block of cells on every set of instructions, beside a plain loop.
@@ -394,6 +464,26 @@ fn the_same_bits_on_any_number_of_threads_and_in_mirrored_halves() {
         }
     };
     bits(&|| plate(BRANCHING, "6e6", NOTCH));
+    bits(&|| solid_plate("scheme = { hybrid = {} }", "state_based"));
+}
+
+#[test]
+fn kicks_that_are_left_to_the_next_step_are_those_of_whole_steps() {
+    let bits = |make: &dyn Fn() -> Simulation| {
+        let hashes = [1, 7, u64::MAX].map(|every| {
+            let mut torn = make();
+            // What looks at velocities gives them the kick.
+            run(&mut torn, |torn| {
+                if torn.clock.step.is_multiple_of(every) {
+                    torn.model.field("velocity").expect("a field");
+                }
+            });
+            torn.model.hash()
+        });
+        assert!(hashes.iter().all(|hash| *hash == hashes[0]));
+    };
+    bits(&|| plate(BRANCHING, "6e6", NOTCH));
+    bits(&|| plate("", "6e6", NOTCH));
     bits(&|| solid_plate("scheme = { hybrid = {} }", "state_based"));
 }
 

@@ -3,9 +3,12 @@
 //! Beside the force, the displacements at the nearest points tell how far the family is strained, without a look at its
 //! bonds.
 
+mod behind;
 mod slopes;
 
 use rayon::prelude::*;
+
+pub use behind::Motion;
 
 use super::packs::{Ends, Instructions, Pack, Packs};
 use super::{Exec, SharedSlice};
@@ -56,16 +59,16 @@ struct Sum<'a, const D: usize, P: Packs> {
     pairs: Vec<BondPair<D, P::Bond>>,
     slopes: Vec<BondSlope<D, P::Bond>>,
     classes: &'a [RowClass],
-    input: [&'a [P::Field]; D],
+    input: [SharedSlice<P::Field>; D],
     /// What slopes take the gradient of.
-    scalar: &'a [P::Field],
+    scalar: SharedSlice<P::Field>,
     output: &'a [SharedSlice<P::Field>],
     /// 1/limits, 1/Δx, and what the products of gradients count.
     strain: P::Bond,
     gradient: P::Bond,
     inverse_spacing: P::Bond,
     products: P::Bond,
-    /// 1/s²: where the squares of all differences to the nearest points add up to less than s², `limits` are kept.
+    /// Where the squares of all differences to the nearest points add up to less than this, `limits` are kept.
     calm: P::Bond,
 }
 
@@ -104,7 +107,7 @@ impl Exec {
         output: [&mut [P::Field]; D],
         limits: &Limits,
     ) -> Vec<u32> {
-        let output = self.shared(body, &input, output);
+        let (input, output) = self.shared(body, input, output);
         let sum = Sum::<D, P>::new(self.instructions, body, regions, input, &output, limits).of(row);
         // SAFETY: the slots of a block belong to its chunk alone, and what its row reaches lies between the guards: `shared`
         // and `SharedRow::new` have seen to it.
@@ -121,7 +124,7 @@ impl Exec {
         input: [&[P::Field]; D],
         density: &mut [P::Field],
     ) {
-        let output = self.shared(body, &input, [density]);
+        let (input, output) = self.shared(body, input, [density]);
         let sum = Sum::<D, P>::new(self.instructions, body, regions, input, &output, &Limits::NONE).of(row);
         // SAFETY: as above.
         sum.each(&regions.collocated, |slot| unsafe {
@@ -133,13 +136,14 @@ impl Exec {
     fn shared<const D: usize, const O: usize, T: Number>(
         &self,
         body: &Body<D>,
-        input: &[&[T]; D],
+        input: [&[T]; D],
         output: [&mut [T]; O],
-    ) -> [SharedSlice<T>; O] {
+    ) -> ([SharedSlice<T>; D], [SharedSlice<T>; O]) {
         let n = body.cloud.n_slots();
         assert!(input.iter().all(|f| f.len() == n), "input fields have the length of the cloud");
         assert!(output.iter().all(|f| f.len() == n), "output fields have the length of the cloud");
-        output.map(|f| SharedSlice(f.as_mut_ptr()))
+        // What is cast is only read.
+        (input.map(|f| SharedSlice(f.as_ptr().cast_mut())), output.map(|f| SharedSlice(f.as_mut_ptr())))
     }
 }
 
@@ -148,7 +152,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
         instructions: Instructions,
         body: &'a Body<D>,
         regions: &'a Regions,
-        input: [&'a [P::Field]; D],
+        input: [SharedSlice<P::Field>; D],
         output: &'a [SharedSlice<P::Field>],
         limits: &Limits,
     ) -> Self {
@@ -161,13 +165,13 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
             slopes: Vec::new(),
             classes: &[],
             input,
-            scalar: &[],
+            scalar: SharedSlice(std::ptr::null_mut()),
             output,
             strain: P::Bond::from_f64(1.0 / limits.strain),
             gradient: P::Bond::from_f64(limits.gradient.powi(-2)),
             inverse_spacing: P::Bond::from_f64(1.0 / lattice.spacing),
             products: P::Bond::from_f64(if limits.linear { 0.0 } else { 1.0 }),
-            calm: P::Bond::from_f64((limits.calm() * lattice.spacing).powi(-2)),
+            calm: P::Bond::from_f64((limits.calm() * lattice.spacing).powi(2)),
         }
     }
 
@@ -183,8 +187,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
             let mut found = Vec::new();
             for &block in blocks {
                 let slot = self.lattice.guard + block as usize * BLOCK;
-                let bits = work(slot);
-                found.extend((0..BLOCK).filter(|k| bits >> k & 1 == 1).map(|k| (slot + k) as u32));
+                behind::note(&mut found, slot, work(slot));
             }
             found
         });
@@ -300,8 +303,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
                 }
             }
         }
-        let squares = squares * V::broadcast(self.calm);
-        squares.keep(mask).largest() < 1.0
+        squares.is_below(V::broadcast(self.calm), mask)
     }
 
     /// How far the nearest points are strained, and how large the gradient is: positive where that is more than is allowed.
@@ -396,7 +398,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
     unsafe fn hold<V: Ends<P::Field>>(&self, first: usize) -> [V::Held; D] {
         let mut held = [V::NOTHING; D];
         for i in 0..D {
-            held[i] = unsafe { V::hold(self.input[i].as_ptr().add(first)) };
+            held[i] = unsafe { V::hold(self.input[i].0.add(first)) };
         }
         held
     }
@@ -405,7 +407,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
     #[inline(always)]
     unsafe fn ends<V: Ends<P::Field>>(&self, component: usize, first: usize, shift: isize) -> [V::Held; 2] {
         unsafe {
-            let here = self.input[component].as_ptr().add(first);
+            let here = self.input[component].0.add(first);
             [V::hold(here.offset(shift)), V::hold(here.offset(-shift))]
         }
     }

@@ -65,26 +65,44 @@ use crate::family::{Body, Bond, BondKernel, BondStates, Families};
 use crate::field::Number;
 use crate::lane::Lane;
 pub use blocks::BlockRow;
-pub use collocation::Limits;
+pub use collocation::{Limits, Motion};
 pub use packs::{Instructions, Packs};
 pub use point_rows::PointRows;
 
-/// Does `work`, compiled for the registers of AVX2 where the machine has them: four numbers at once instead of two in loops
-/// over plain vectors. Nothing is fused, so the bits are those of the baseline.
+/// A loop over plain vectors, for [`wide`]. `run` must be `#[inline(always)]`, and all that it calls: only what is inlined is
+/// compiled for wide registers.
+pub trait Sweep {
+    type Output;
+    fn run(self) -> Self::Output;
+}
+
+/// Runs a loop, compiled for the registers of AVX-512 or AVX2 where the machine has them: more numbers at once than the
+/// baseline's two. Nothing is fused, so the bits are those of the baseline.
 #[inline(always)]
-pub fn wide<R>(work: impl FnOnce() -> R) -> R {
+pub fn wide<S: Sweep>(sweep: S) -> S::Output {
     #[cfg(target_arch = "x86_64")]
     {
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq")]
+        fn on_avx512<S: Sweep>(sweep: S) -> S::Output {
+            sweep.run()
+        }
         #[target_feature(enable = "avx2")]
-        unsafe fn on_avx2<R>(work: impl FnOnce() -> R) -> R {
-            work()
+        fn on_avx2<S: Sweep>(sweep: S) -> S::Output {
+            sweep.run()
+        }
+        if is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("avx512dq")
+        {
+            // SAFETY: the machine has them.
+            return unsafe { on_avx512(sweep) };
         }
         if is_x86_feature_detected!("avx2") {
             // SAFETY: the machine has it.
-            return unsafe { on_avx2(work) };
+            return unsafe { on_avx2(sweep) };
         }
     }
-    work()
+    sweep.run()
 }
 
 /// Which bonds break: asked only about bonds strained beyond `threshold`, in the strain of the kernel.

@@ -35,7 +35,7 @@ pub trait Source {
     fn hybrid(&self) -> Option<Work> {
         None
     }
-    fn hash(&self) -> String;
+    fn hash(&mut self) -> String;
     /// Bonds of each point that hold now, in point order.
     fn family_sizes(&self) -> Vec<u32>;
     /// The state of every bond: bits, set while it holds, one at each of its ends. Their order follows from the points,

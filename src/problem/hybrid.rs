@@ -17,11 +17,12 @@ use super::Problem;
 use crate::conditions::Prescribed;
 use crate::discretization::Regions;
 use crate::discretization::collocation::{SharedRow, SharedSlope};
-use crate::execution::{Exec, Limits, Packs};
+use crate::execution::{Exec, Limits, Motion, Packs};
 use crate::family::{Body, BondLaw, Families};
 use crate::field::{Double, Number, Precision, components, components_mut};
 use crate::physics::elasticity::state_based::Changing;
 use crate::physics::elasticity::{Edge, Elasticity, Overstretched, State, doubles, doubles_mut};
+use crate::solver::Drift;
 
 /// Numbers that a thread updates at a time.
 const CHUNK: usize = 16 * 1024;
@@ -122,10 +123,47 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
             state.changing().turn();
         }
         let strained = self.first_rows(body, exec, state);
+        self.go_on(&strained, physics, body, exec, state, dt);
+    }
+
+    /// Whether rows can be summed in the pass that drifts: those of a solid of bonds, where u + τ v is kept.
+    pub(super) fn evaluates_behind(&self) -> bool {
+        self.dilatation.is_none() && self.looks_ahead()
+    }
+
+    /// Drifts, slab by slab, with the first rows behind, and evaluates. Gives what the drift gives.
+    pub(super) fn evaluate_behind<L: BondLaw<D>>(
+        &mut self,
+        drift: &Drift<P::Field>,
+        physics: &Elasticity<L>,
+        body: &Body<D>,
+        exec: &mut Exec,
+        state: &mut State<P>,
+        dt: f64,
+    ) -> f64 {
+        let State { displacement, velocity, force, .. } = state;
+        let motion = Motion { displacement, velocity, force, ahead: &mut self.ahead };
+        let pass = |m: Motion<'_, P::Field>| drift.pass(m.displacement, m.velocity, m.force, m.ahead);
+        let (row, regions, limits) = (&self.row, &self.regions, &self.limits);
+        let (strained, squares) = exec.collocate_behind::<D, P>(body, row, regions, motion, limits, &pass);
+        self.go_on(&strained, physics, body, exec, state, dt);
+        squares
+    }
+
+    /// What follows when rows have said which points are strained too far.
+    fn go_on<L: BondLaw<D>>(
+        &mut self,
+        strained: &[u32],
+        physics: &Elasticity<L>,
+        body: &Body<D>,
+        exec: &mut Exec,
+        state: &mut State<P>,
+        dt: f64,
+    ) {
         if self.adaptive {
-            self.switch(body, exec, &strained);
-        } else if !strained.is_empty() {
-            self.warn(body, strained[0] as usize);
+            self.switch(body, exec, strained);
+        } else if let Some(&slot) = strained.iter().min() {
+            self.warn(body, slot as usize);
         }
         let tau = if self.damps_bonds { self.damping } else { 0.0 };
         loop {
@@ -229,7 +267,11 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
 
     /// τ and where a solver that drifts may put u + τ v in passing.
     pub(super) fn ahead(&mut self) -> Option<(f64, &mut [P::Field])> {
-        (self.damping > 0.0 && !self.ahead.is_empty()).then_some((self.damping, &mut self.ahead[..]))
+        self.looks_ahead().then_some((self.damping, &mut self.ahead[..]))
+    }
+
+    fn looks_ahead(&self) -> bool {
+        self.damping > 0.0 && !self.ahead.is_empty()
     }
 
     /// A solver has drifted, and prescribed values have been set behind it.
@@ -409,6 +451,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         if !due || self.hybrid.as_ref().is_none_or(|hybrid| hybrid.damping == 0.0) {
             return;
         }
+        self.catch_up();
         let power = self.power_of_damping();
         let hybrid = self.hybrid.as_mut().expect("it is damped");
         if !first {

@@ -12,7 +12,7 @@ pub use bondwise_linear as linear;
 pub use forward_euler::ForwardEuler;
 pub use runge_kutta::RungeKutta;
 pub use statics::Statics;
-pub use velocity_verlet::VelocityVerlet;
+pub use velocity_verlet::{Drift, VelocityVerlet};
 
 use crate::field::Number;
 
@@ -113,6 +113,11 @@ pub trait System {
     fn evaluate(&mut self, t: f64, dt: f64);
     /// Largest stable step of velocity Verlet, s.
     fn stable_step(&self) -> f64;
+    /// Drifts, and evaluates at time `t`, `dt` later, what has just drifted and is still at hand, and gives what the drift
+    /// gives; None, with nothing done, where the system cannot, or imposes values in between.
+    fn evaluate_behind(&mut self, _drift: &Drift<Self::Number>, _t: f64, _dt: f64) -> Option<f64> {
+        None
+    }
 }
 
 /// What a solver with several stages in a step advances.

@@ -1,6 +1,6 @@
 //! Slopes on lattices: divergences and gradients by one row that all points share, for the two passes of a state-based solid.
 
-use super::{BondSlope, Limits, Sum};
+use super::{BondSlope, Limits, SharedSlice, Sum};
 use crate::discretization::Regions;
 use crate::discretization::collocation::{RowClass, SharedSlope, SlopePair};
 use crate::execution::Exec;
@@ -22,7 +22,7 @@ impl Exec {
         output: &mut [P::Field],
         limits: &Limits,
     ) -> Vec<u32> {
-        let output = self.shared(body, &input, [output]);
+        let (input, output) = self.shared(body, input, [output]);
         let sum = Sum::<D, P>::new(self.instructions, body, regions, input, &output, limits).along(slope, scale);
         // SAFETY: as above.
         sum.each(blocks, |slot| unsafe { sum.divergence(slot) })
@@ -37,10 +37,10 @@ impl Exec {
         scalar: &[P::Field],
         output: [&mut [P::Field]; D],
     ) {
-        let output = self.shared(body, &[scalar; D], output);
+        let (input, output) = self.shared(body, [scalar; D], output);
         let mut sum =
-            Sum::<D, P>::new(self.instructions, body, regions, [scalar; D], &output, &Limits::NONE).along(slope, scale);
-        sum.scalar = scalar;
+            Sum::<D, P>::new(self.instructions, body, regions, input, &output, &Limits::NONE).along(slope, scale);
+        sum.scalar = input[0];
         // SAFETY: as above.
         sum.each(&regions.collocated, |slot| unsafe {
             sum.gradient(slot);
@@ -134,7 +134,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
     #[inline(always)]
     unsafe fn across<V: Pack<P::Bond> + Ends<P::Field>>(
         &self,
-        field: &[P::Field],
+        field: SharedSlice<P::Field>,
         k: usize,
         class: &RowClass,
         axis: usize,
@@ -143,7 +143,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
         let place = (class.axes & ((1 << axis) - 1)).count_ones();
         // SAFETY: pairs are of the slope, whose reach is inside the field.
         unsafe {
-            let at = field.as_ptr().add(first);
+            let at = field.0.add(first);
             let n = class.members;
             match (class.images, place) {
                 (1, _) => self.step::<V>(at, k),

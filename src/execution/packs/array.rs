@@ -103,6 +103,10 @@ macro_rules! numbers {
                 largest.to_f64()
             }
             #[inline(always)]
+            fn is_below(self, limit: Self, mask: u16) -> bool {
+                (0..N).all(|k| mask >> k & 1 == 0 || self.0[k] < limit.0[k])
+            }
+            #[inline(always)]
             fn lane(self, k: usize) -> f64 {
                 self.0[k].to_f64()
             }
@@ -224,6 +228,17 @@ impl<const FUSED: bool> Between<[i32; 4]> for Array<f32, FUSED> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lanes_without_a_bit_need_not_be_below() {
+        let lanes = Array::<f64, false>([1.0, 3.0, f64::NAN, 2.0]);
+        let limit = Array([2.0; 4]);
+        for (mask, below) in
+            [(0b0001, true), (0b0011, false), (0b0101, false), (0b1001, false), (0b11_0001, true), (0, true)]
+        {
+            assert_eq!(lanes.is_below(limit, mask), below, "{mask:b}");
+        }
+    }
 
     #[test]
     fn keep_zeroes_exactly_the_lanes_without_a_bit() {

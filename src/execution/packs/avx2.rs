@@ -110,6 +110,16 @@ impl Pack<f64> for F64 {
         (1..N).fold(self.lane(0), |largest, k| f64::max(largest, self.lane(k)))
     }
     #[inline(always)]
+    fn is_below(self, limit: Self, mask: u16) -> bool {
+        // Not less, unordered counts.
+        let (a, b) = unsafe {
+            let a = _mm256_cmp_pd::<_CMP_NLT_UQ>(self.0[0], limit.0[0]);
+            let b = _mm256_cmp_pd::<_CMP_NLT_UQ>(self.0[1], limit.0[1]);
+            (_mm256_movemask_pd(a), _mm256_movemask_pd(b))
+        };
+        (a | b << 4) & i32::from(mask) == 0
+    }
+    #[inline(always)]
     fn total(self) -> f64 {
         unsafe {
             let four = _mm256_add_pd(self.0[0], self.0[1]);
@@ -160,6 +170,11 @@ impl Pack<f32> for F32 {
     #[inline(always)]
     fn largest(self) -> f64 {
         (1..N).fold(self.lane(0), |largest, k| f64::max(largest, self.lane(k)))
+    }
+    #[inline(always)]
+    fn is_below(self, limit: Self, mask: u16) -> bool {
+        let beyond = unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_NLT_UQ>(self.0, limit.0)) };
+        beyond & i32::from(mask) == 0
     }
     #[inline(always)]
     fn total(self) -> f32 {

@@ -106,6 +106,16 @@ impl Pack<f64> for F64 {
         unsafe { _mm512_reduce_max_pd(_mm512_max_pd(self.0[0], self.0[1])) }
     }
     #[inline(always)]
+    fn is_below(self, limit: Self, mask: u16) -> bool {
+        let [low, high] = halves(mask);
+        // Not less, unordered counts.
+        unsafe {
+            let a = _mm512_mask_cmp_pd_mask::<_CMP_NLT_UQ>(low, self.0[0], limit.0[0]);
+            let b = _mm512_mask_cmp_pd_mask::<_CMP_NLT_UQ>(high, self.0[1], limit.0[1]);
+            a | b == 0
+        }
+    }
+    #[inline(always)]
     fn total(self) -> f64 {
         unsafe {
             let eight = _mm512_add_pd(self.0[0], self.0[1]);
@@ -156,6 +166,10 @@ impl Pack<f32> for F32 {
     #[inline(always)]
     fn largest(self) -> f64 {
         unsafe { f64::from(_mm512_reduce_max_ps(self.0)) }
+    }
+    #[inline(always)]
+    fn is_below(self, limit: Self, mask: u16) -> bool {
+        unsafe { _mm512_mask_cmp_ps_mask::<_CMP_NLT_UQ>(mask, self.0, limit.0) == 0 }
     }
     #[inline(always)]
     fn total(self) -> f32 {

@@ -84,6 +84,8 @@ pub trait Pack<B: Number>: Lane {
     fn clamped(self) -> Self;
     /// The largest lane.
     fn largest(self) -> f64;
+    /// Whether all lanes whose bit is set are below those of `limit`; a NaN is not.
+    fn is_below(self, limit: Self, mask: u16) -> bool;
     /// The sum of the lanes: each of the lower half and its fellow of the upper half, and so on with the halves.
     fn total(self) -> B;
     fn lane(self, k: usize) -> f64;
