@@ -228,14 +228,17 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
     /// is told: see [`Statics::solve`](crate::solver::Statics::solve). False when it was interrupted.
     ///
     /// Where a step of velocity Verlet can leave its last kick to the next, velocities in `state` lack it until
-    /// [`catch_up`](Self::catch_up), which all that asks for velocities and energies here does; the watch is then over the
-    /// motion at the end of the step before.
+    /// [`catch_up`](Self::catch_up), which all that asks for velocities and energies here does; the watch then begins with
+    /// the motion at the end of the step before.
     pub fn step(
         &mut self,
         solver: &Solver,
         clock: &mut Clock,
         observe: &mut dyn FnMut(usize, f64) -> bool,
     ) -> Result<bool> {
+        if self.owed.is_some_and(|(last, dt)| (Solver::VelocityVerlet(last), dt) != (*solver, clock.dt)) {
+            self.catch_up();
+        }
         match solver {
             Solver::Statics(statics) => return self.settle(statics, clock, observe),
             Solver::VelocityVerlet(verlet) => {
@@ -269,7 +272,11 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
                 (self.ledger.kinetic, self.ledger.momentum) = self.motion();
             }
         }
-        self.watch(solver, clock)?;
+        if self.watch(solver, clock).is_err() {
+            // What was kept of the step before and what came in since are of two instants: this one decides.
+            self.catch_up();
+            self.watch(solver, clock)?;
+        }
         self.book_stiffness_damping(clock.step, clock.dt, false);
         if self.adaptation.as_ref().is_some_and(|adaptation| clock.step.is_multiple_of(adaptation.every)) {
             self.adapt(clock.time(), false);
@@ -291,7 +298,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         self.ledger.kinetic = 0.5 * self.physics.density * volume * squares;
     }
 
-    /// At the end of a run: catches up, and watches over the result of its last step.
+    /// At the end of a run, or of a solver's part of it: catches up, and watches over the result of its last step.
     pub fn conclude(&mut self, solver: &Solver, clock: &Clock) -> Result<()> {
         self.catch_up();
         self.watch(solver, clock)

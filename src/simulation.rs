@@ -37,7 +37,7 @@ pub trait Stepper: Source + Send {
     ) -> Result<bool>;
     /// Hands the body over to another solver at time `t`, s.
     fn hand_over(&mut self, solver: &Solver, t: f64);
-    /// Ends a run: whether the numbers of its last step are sound.
+    /// Ends a run, or a solver's part of it: whether the numbers of the last step are sound.
     fn conclude(&mut self, _solver: &Solver, _clock: &Clock) -> Result<()> {
         Ok(())
     }
@@ -160,6 +160,7 @@ impl Simulation {
     /// Takes the next step, by the next solver where it is its turn. `observe`: see [`Stepper::step_observed`].
     pub fn step(&mut self, observe: &mut dyn FnMut(usize, f64) -> bool) -> Result<bool> {
         if let Some(leg) = self.later.front().copied().filter(|leg| leg.first == self.clock.step) {
+            self.model.conclude(&self.solver, &self.clock)?;
             self.later.pop_front();
             self.clock.turn(leg.dt);
             self.solver = leg.solver;

@@ -192,6 +192,8 @@ fn rows_behind_a_motion_are_those_after_it() {
     compare_behind::<2, Double>([180.0, 110.0], 29);
     compare_behind::<2, Single>([110.0, 180.0], 29);
     compare_behind::<3, Double>([40.0, 30.0, 24.0], 33);
+    // High enough for several tiles.
+    compare_behind::<3, Double>([40.0, 70.0, 24.0], 33);
 }
 
 /// Slopes of a block of cells on every set of instructions, beside a plain loop.

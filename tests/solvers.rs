@@ -134,6 +134,71 @@ end_time = 6e-6
     assert_eq!((plate(2), plate(3)), (one.clone(), one));
 }
 
+/// A plate under `load`, a body force in x, with these solvers one after the other.
+fn pushed(load: &str, solvers: &str) -> Simulation {
+    from_text(&format!(
+        r#"
+[case]
+title = "A plate that is pushed"
+dimension = 2
+[geometry]
+shape = {{ rectangle = {{ size = [0.03, 0.02] }} }}
+spacing = 1e-3
+[discretization]
+horizon_ratio = 3
+[physics.elasticity]
+law = {{ bond_based = {{ young = "70 GPa", density = 2700.0 }} }}
+[[conditions]]
+on = "all"
+load = {{ body_force = {{ component = 0, value = "{load}" }} }}
+{solvers}
+"#
+    ))
+}
+
+const VERLET: &str = "[[solver]]\nvelocity_verlet = { end_time = \"5 us\", time_step = \"0.1 us\" }\n";
+
+/// On a lattice velocity Verlet leaves its last kick to the next step, which the next solver does not know.
+#[test]
+fn a_kick_that_is_owed_is_given_before_the_next_solver_begins() {
+    let solvers = format!("{VERLET}[[solver]]\nrunge_kutta = {{ end_time = \"8 us\" }}\n");
+    let hashes = [true, false].map(|looks| {
+        let mut plate = pushed("1e9*x", &solvers);
+        plate.model.start();
+        while plate.clock.step < plate.n_steps {
+            assert!(plate.step(&mut |_, _| true).unwrap());
+            if looks {
+                plate.model.field("velocity").unwrap();
+            }
+        }
+        plate.model.hash()
+    });
+    assert_eq!(hashes[0], hashes[1]);
+}
+
+#[test]
+fn a_body_that_is_braked_to_rest_is_no_runaway() {
+    // As much forth as back, and a step of nothing between: all of the work comes out again when the body rests.
+    let mut plate = pushed("if(t < 2.45e-6, 1e9, if(t < 2.55e-6, 0, -1e9))", VERLET);
+    plate.model.start();
+    for _ in 0..50 {
+        assert!(plate.step(&mut |_, _| true).unwrap());
+    }
+    let (balance, fastest) = (plate.model.balance(), 1e9 / 2700.0 * 2.45e-6);
+    let whole = 0.5 * 2700.0 * fastest * fastest * 0.03 * 0.02;
+    assert!(balance.kinetic < 1e-12 * whole, "{} of {whole}", balance.kinetic);
+}
+
+#[test]
+fn a_solver_whose_last_step_runs_away_does_not_hand_over() {
+    let solvers = "[[solver]]\nvelocity_verlet = { end_time = \"0.4 us\", time_step = \"0.1 us\" }\n\
+        [[solver]]\nrunge_kutta = { end_time = \"1 us\" }\n";
+    let mut plate = pushed("if(t > 0.35e-6, 1e300, 1e9)", solvers);
+    plate.model.start();
+    let ends: Vec<_> = (0..5).map(|_| plate.step(&mut |_, _| true)).take_while(|step| step.is_ok()).collect();
+    assert_eq!((ends.len(), plate.clock.step), (4, 4), "stopped where the last step of the first ended");
+}
+
 const PULLED: &str = r#"
 [[conditions]]
 on = "left"

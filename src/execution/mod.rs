@@ -293,10 +293,10 @@ impl Exec {
     }
 }
 
-/// An output component that chunks write at disjoint places.
+/// A component of a field that chunks write at disjoint places, and read where none writes.
 #[derive(Clone, Copy)]
 struct SharedSlice<T>(*mut T);
-// SAFETY: `pass` gives each chunk its own slots, and no slot to two chunks.
+// SAFETY: what uses it gives each chunk its own slots to write, no slot to two chunks, and lets none be read meanwhile.
 unsafe impl<T: Number> Send for SharedSlice<T> {}
 unsafe impl<T: Number> Sync for SharedSlice<T> {}
 

@@ -1,5 +1,6 @@
 //! Rows in the pass that makes what they act on: slab by slab, so that what the motion leaves is read again, and the force that
-//! it has read is written again, while they are in the cache.
+//! it has read is written again, while they are in the cache. In 3D, where a row reaches planes, the cache is too small for that,
+//! and rows follow when all is made.
 
 use std::ops::Range;
 
@@ -13,7 +14,7 @@ use crate::execution::packs::Packs;
 use crate::family::Body;
 use crate::geometry::lattice::BLOCK;
 
-/// Slots in a slab: few enough that the second-level cache holds a few slabs of four vectors in 2D.
+/// Slots in a slab: the second-level cache holds a few slabs of four vectors in 2D.
 const SLAB: usize = 4096;
 
 /// The vectors of a step, or the same part of each.
@@ -56,8 +57,8 @@ impl Exec {
         let Motion { displacement, velocity, force, ahead } = motion;
         let [u, v, f, ahead] = [displacement, velocity, force, ahead].map(parts);
         let make = |slots: Range<usize>| -> f64 {
-            // SAFETY: slots between 0 and n, each in one call; rows touch only those that were made in their own strip before,
-            // or all when all are made.
+            // SAFETY: slots between 0 and n, each in one call; rows touch only those that were made before in their own strip,
+            // or by any when all are made.
             let part = |of: &[SharedSlice<P::Field>; D], d: usize| unsafe {
                 std::slice::from_raw_parts_mut(of[d].0.add(slots.start), slots.len())
             };
@@ -77,7 +78,8 @@ impl Exec {
 
 impl<const D: usize, P: Packs> Sum<'_, D, P> {
     /// As [`each`](Self::each) over all blocks with a row, but `make` is called for all slots, slab by slab, and work on a
-    /// block is done once all is made that its row reaches.
+    /// block is done once all is made that its row reaches. Where blocks are not in the order of slots, as in the tiles of 3D,
+    /// that is when all is made.
     fn each_behind(
         &self,
         make: &(impl Fn(Range<usize>) -> f64 + Sync),
@@ -88,6 +90,11 @@ impl<const D: usize, P: Packs> Sum<'_, D, P> {
         let reaches = self.pairs.iter().map(|pair| pair.shift.unsigned_abs());
         let reach = reaches.chain(self.lattice.strides).max().unwrap_or(0);
         let n_slabs = n.div_ceil(SLAB);
+        if !blocks.is_sorted() {
+            let slabs = (0..n_slabs).into_par_iter().map(|slab| make(slab * SLAB..((slab + 1) * SLAB).min(n)));
+            let sums: Vec<f64> = slabs.collect();
+            return (self.each(blocks, work), sums.iter().sum());
+        }
         let strip = |slabs: Range<usize>| {
             let (begin, end) = (slabs.start * SLAB, (slabs.end * SLAB).min(n));
             let from = |slot: usize| blocks.partition_point(|&block| first(block) < slot);
@@ -107,6 +114,7 @@ impl<const D: usize, P: Packs> Sum<'_, D, P> {
                 sum
             };
             let sums = slabs.map(make_and_follow).collect();
+            assert_eq!(next, inner.end, "all is made that rows of a strip reach");
             Strip { found, sums, left: [mine.start..inner.start, inner.end..mine.end] }
         };
         let wide = n_slabs.div_ceil(rayon::current_num_threads());
