@@ -7,6 +7,9 @@
 use std::fmt::Debug;
 use std::ops::{Add, Mul};
 
+use crate::unknown::{Numbers, Vectors};
+use crate::visit::Visitor;
+
 /// A number that a field is stored in, or that the arithmetic along a bond is done in: `f64` or `f32`.
 pub trait Number:
     Copy + Default + PartialOrd + Debug + Send + Sync + Add<Output = Self> + Mul<Output = Self> + 'static
@@ -17,24 +20,25 @@ pub trait Number:
     fn is_below(self, limit: Self) -> bool;
     /// Its bytes, the lowest first.
     fn bytes(self) -> impl AsRef<[u8]>;
-    /// A field as one of double precision, if it is that.
-    fn doubles(_field: &[Self]) -> Option<&[f64]> {
-        None
-    }
-    /// The same, to be written.
-    fn doubles_mut(_field: &mut [Self]) -> Option<&mut [f64]> {
-        None
-    }
+    /// The vectors of a body, as solvers see them.
+    fn numbers(vectors: Vectors<'_, Self>) -> Numbers<'_>;
+    /// Of two copies of the same values, that of these numbers.
+    fn choose<'a>(double: &'a [f64], single: &'a [f32]) -> &'a [Self];
+    /// Hands a vector over in the numbers that it is stored in.
+    fn visit(values: &mut Vec<Self>, name: &str, visitor: &mut dyn Visitor);
     /// A fraction of a length that is nothing: far below rounding, far above the smallest numbers, which are slow.
     const NEGLIGIBLE: f64;
 }
 
 impl Number for f64 {
-    fn doubles(field: &[Self]) -> Option<&[f64]> {
-        Some(field)
+    fn numbers(vectors: Vectors<'_, Self>) -> Numbers<'_> {
+        Numbers::Double(vectors)
     }
-    fn doubles_mut(field: &mut [Self]) -> Option<&mut [f64]> {
-        Some(field)
+    fn choose<'a>(double: &'a [f64], _: &'a [f32]) -> &'a [Self] {
+        double
+    }
+    fn visit(values: &mut Vec<Self>, name: &str, visitor: &mut dyn Visitor) {
+        visitor.doubles(name, values);
     }
     const NEGLIGIBLE: f64 = 1e-150;
     #[inline(always)]
@@ -55,6 +59,15 @@ impl Number for f64 {
 }
 
 impl Number for f32 {
+    fn numbers(vectors: Vectors<'_, Self>) -> Numbers<'_> {
+        Numbers::Single(vectors)
+    }
+    fn choose<'a>(_: &'a [f64], single: &'a [f32]) -> &'a [Self] {
+        single
+    }
+    fn visit(values: &mut Vec<Self>, name: &str, visitor: &mut dyn Visitor) {
+        visitor.singles(name, values);
+    }
     const NEGLIGIBLE: f64 = 1e-20;
     #[inline(always)]
     fn from_f64(x: f64) -> Self {

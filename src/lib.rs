@@ -29,6 +29,8 @@ pub mod problem;
 pub mod refinement;
 pub mod simulation;
 pub mod solver;
+pub mod unknown;
 pub mod verify;
+pub mod visit;
 
 pub use error::{Error, Result};

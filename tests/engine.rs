@@ -8,7 +8,7 @@ use bondwise::field::{Double, Mixed, Number, Single};
 use bondwise::geometry::lattice::BLOCK;
 use bondwise::geometry::{Arrangement, Cloud, Shape};
 use bondwise::lane::Lane;
-use bondwise::physics::elasticity::bond_based::{BondBased, BondBasedLinear};
+use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -39,11 +39,11 @@ impl<const D: usize, B: BondLaw<D>, const SMALL: bool, const EXACT: bool> BondKe
         self.0.strain(bond, eta)
     }
     #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], _: &[L; 0], strain: L, sum: [L; D]) -> [L; D] {
         self.0.force(bond, eta, strain, sum)
     }
     #[inline(always)]
-    fn add_small<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
+    fn add_small<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], _: &[L; 0], strain: L, sum: [L; D]) -> [L; D] {
         self.0.small_force(bond, eta, strain, sum)
     }
 }
@@ -333,7 +333,7 @@ fn rows_give_the_sums_of_their_bonds() {
             BondBasedLinear.strain(bond, eta)
         }
         #[inline(always)]
-        fn add<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
+        fn add<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], _: &[L; 0], strain: L, sum: [L; D]) -> [L; D] {
             BondBasedLinear.force(bond, eta, strain, sum)
         }
     }

@@ -175,7 +175,7 @@ fn compare_behind<const D: usize, P: Packs>(cells: [f64; D], points: usize) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
         let (mut found, sum) = pool.install(|| {
             let pass = |m: Motion<'_, P::Field>| pass(m.displacement, m.velocity, m.force, m.ahead);
-            Exec::default().collocate_behind::<D, P>(&body, &row, &regions, motion, &limits, &pass)
+            Exec::default().collocate_fused::<D, P>(&body, &row, &regions, motion, &limits, &pass)
         });
         found.sort_unstable();
         assert!((u_behind, v_behind, ahead_behind) == (u.clone(), v.clone(), ahead.clone()), "{D}D: motion");

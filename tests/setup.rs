@@ -5,12 +5,11 @@
 use std::time::Instant;
 
 use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
-use bondwise::execution::Exec;
 use bondwise::field::components_mut;
 use bondwise::geometry::{Cloud, Shape};
-use bondwise::physics::Elasticity;
-use bondwise::physics::elasticity::State;
-use bondwise::physics::elasticity::bond_based::BondBased;
+use bondwise::physics::Physics;
+use bondwise::physics::elasticity::laws::BondBased;
+use bondwise::physics::elasticity::{Bonds, Elasticity};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -46,25 +45,20 @@ fn set_up(rule: PartialVolume, mut positions: Vec<[f64; 3]>, shuffle: bool) {
     let cloud = timed("cloud", || Cloud::scattered(positions, volumes));
     let body = timed("families", || standard::body(cloud, 3.015, rule));
     let operator = timed("weights", || Operator::standard(&body, 1.0, Influence::Constant, rule));
-    let physics = Elasticity { law: BondBased, density: 1.0, operator, failure: None, state_based: None };
-    let mut state: State = timed("states", || physics.initial_state(&body));
-    std::hint::black_box(timed("stable step", || physics.stable_step(&body)));
-    let mut exec = Exec::default();
-    for slot in 0..body.cloud.n_slots() {
-        let x = body.cloud.position(slot);
-        for (c, u) in components_mut::<3, _>(&mut state.displacement).into_iter().zip(x) {
+    let mut physics: Elasticity<3> =
+        timed("states and volumes", || Elasticity::new(body, operator, Box::new(Bonds(BondBased)), 1.0, None));
+    std::hint::black_box(timed("stable step", || physics.stable_step()));
+    let n = physics.body.cloud.n_slots();
+    for slot in 0..n {
+        let x = physics.body.cloud.position(slot);
+        for (c, u) in components_mut::<3, _>(&mut physics.state.displacement).into_iter().zip(x) {
             c[slot] = 1e-3 * (0.1 * u).sin();
         }
     }
-    timed("one sum of forces", || physics.evaluate(&body, &mut exec, &mut state, 0.0, None));
-    let mut volume = vec![0.0; body.cloud.n_slots()];
-    timed("one sum of volumes", || physics.bonded_volume(&body, &mut exec, &state.states, &mut volume));
-    let bonds = state.states.count();
-    println!(
-        "  {} bonds a point, peak memory {:.2} GiB",
-        bonds / body.cloud.n_points() as u64,
-        peak().unwrap_or(f64::NAN)
-    );
+    timed("one sum of forces", || physics.evolve(0.0));
+    timed("one sum of volumes", || physics.field("damage", 0..n));
+    let bonds = physics.state.states.count();
+    println!("  {} bonds a point, peak memory {:.2} GiB", bonds / n as u64, peak().unwrap_or(f64::NAN));
 }
 
 #[test]

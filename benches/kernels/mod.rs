@@ -3,14 +3,14 @@
 use bondwise::discretization::collocation::SharedRow;
 use bondwise::discretization::{Collocation, Influence, Operator, PartialVolume, Regions, standard};
 use bondwise::execution::{Exec, Instructions, Limits, Packs};
-use bondwise::family::{Body, BondLaw, BondStates};
+use bondwise::family::{Body, BondStates};
 use bondwise::field::{Double, Mixed, Number, Single, components, components_mut};
 use bondwise::geometry::{Arrangement, Cloud, Shape};
-use bondwise::physics::Elasticity;
-use bondwise::physics::elasticity::State;
-use bondwise::physics::elasticity::bond_based::{BondBased, BondBasedLinear};
+use bondwise::physics::Physics;
+use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
+use bondwise::physics::elasticity::linear_solid::{LinearSolid, Moduli, Stretch};
 use bondwise::physics::elasticity::moduli::Hypothesis;
-use bondwise::physics::elasticity::state_based::{Moduli, StateBased};
+use bondwise::physics::elasticity::{Bonds, Elasticity, Material};
 use bondwise::physics::failure::CriticalStretch;
 
 /// Points along the edges of the bodies.
@@ -93,16 +93,16 @@ fn filled<const D: usize>(edges: [usize; D]) -> Cloud<D> {
     Cloud::lattice(&Shape::Box { low: [0.0; D], high: edges.map(|n| n as f64 * SPACING) }, SPACING, 4)
 }
 
-fn plate<L: BondLaw<2> + 'static, P: Packs>(law: L, what: What, edges: Edges, instructions: Instructions) -> Kernel {
+fn plate<L: Stretch<2> + 'static, P: Packs>(law: L, what: What, edges: Edges, instructions: Instructions) -> Kernel {
     on_body::<2, L, P>(filled(edges.plate), law, what, instructions)
 }
 
-fn solid<L: BondLaw<3> + 'static, P: Packs>(law: L, what: What, edges: Edges, instructions: Instructions) -> Kernel {
+fn solid<L: Stretch<3> + 'static, P: Packs>(law: L, what: What, edges: Edges, instructions: Instructions) -> Kernel {
     on_body::<3, L, P>(filled(edges.solid), law, what, instructions)
 }
 
 /// The points of a lattice, each moved a little.
-fn cloud<L: BondLaw<3> + 'static, P: Packs>(law: L, what: What, edges: Edges, instructions: Instructions) -> Kernel {
+fn cloud<L: Stretch<3> + 'static, P: Packs>(law: L, what: What, edges: Edges, instructions: Instructions) -> Kernel {
     let lattice = filled::<3>(edges.cloud);
     let moved = |(k, &slot): (usize, &u32)| {
         let phase = k as f64;
@@ -116,7 +116,7 @@ fn cloud<L: BondLaw<3> + 'static, P: Packs>(law: L, what: What, edges: Edges, in
 }
 
 /// A body, slightly deformed, in which no bond breaks.
-fn on_body<const D: usize, L: BondLaw<D> + 'static, P: Packs>(
+fn on_body<const D: usize, L: Stretch<D> + 'static, P: Packs>(
     points: Cloud<D>,
     law: L,
     what: What,
@@ -126,9 +126,13 @@ fn on_body<const D: usize, L: BondLaw<D> + 'static, P: Packs>(
     let operator = Operator::standard(&body, 1.0, Influence::Constant, PartialVolume::None);
     let failure = (what != What::Unbreakable).then(|| CriticalStretch::uniform(0.1));
     let solid = Moduli::new(Hypothesis::Solid, 1.0, 0.3);
-    let state_based = (what == What::TwoPasses).then(|| StateBased::new(solid, L::LINEAR, &body, &operator.weights));
-    let physics = Elasticity { law, density: 1.0, operator, failure, state_based };
-    let mut state: State<P> = physics.initial_state(&body);
+    let material: Box<dyn Material<D, P>> = if what == What::TwoPasses {
+        Box::new(LinearSolid::new(law, solid, &body, &operator.weights))
+    } else {
+        Box::new(Bonds(law))
+    };
+    let mut elasticity = Elasticity::new(body, operator, material, 1.0, failure);
+    let Elasticity { body, state, .. } = &mut elasticity;
     // Strains up to 0.1 %, or 3 %: those of the first are below the 1 % up to which small forms serve.
     let stretch = if what == What::ExactForce { 3e-2 } else { 1e-3 };
     for &slot in &body.cloud.slots {
@@ -138,13 +142,10 @@ fn on_body<const D: usize, L: BondLaw<D> + 'static, P: Packs>(
         }
     }
     let bonds = state.states.count();
-    let mut exec = Exec::on(instructions);
-    let mut density = vec![P::Field::default(); body.cloud.n_slots()];
+    elasticity.exec = Exec::on(instructions);
     let evaluate = move || match what {
-        What::Energy => physics.strain_energy_density(&body, &mut exec, &state, &mut density),
-        What::Force | What::ExactForce | What::Unbreakable | What::TwoPasses => {
-            physics.evaluate(&body, &mut exec, &mut state, 0.0, None)
-        }
+        What::Energy => drop(elasticity.energy_density()),
+        What::Force | What::ExactForce | What::Unbreakable | What::TwoPasses => elasticity.evolve(0.0),
     };
     Kernel { bonds, evaluate: Box::new(evaluate) }
 }

@@ -13,15 +13,15 @@ use super::bundled;
 use super::check::check;
 use super::diagnostics::{Diagnostic, Severity};
 use super::model::{
-    self, BondBased, Case, FieldName, InfluenceFunction, Law, Motion, Output, PartialVolumes, Plane, Precision, Scheme,
+    self, Case, FieldName, InfluenceFunction, Motion, Output, PartialVolumes, Plane, Precision, Scheme,
     SurfaceCorrection,
 };
 use super::read::{Located, Source};
 use crate::conditions::initial;
 use crate::discretization::{Correction, Influence, Operator, PartialVolume, Scaling, standard};
 use crate::error::{Error, Result};
-use crate::execution::Packs;
-use crate::family::{Body, BondLaw, Update};
+use crate::execution::{Exec, Packs};
+use crate::family::{Body, Update};
 use crate::field::{Double, Mixed, Single, components_mut};
 use crate::geometry::Arrangement;
 use crate::output::crack_tip::CrackTip;
@@ -32,10 +32,12 @@ use crate::output::probe::Probe;
 use crate::output::schedule::Schedule;
 use crate::output::source::Facts;
 use crate::output::writer::Output as Written;
-use crate::physics::Elasticity;
-use crate::physics::elasticity::bond_based;
+use crate::physics::Physics;
+use crate::physics::elasticity::laws::{BondBased as NonlinearBonds, BondBasedLinear as LinearBonds};
+use crate::physics::elasticity::linear_solid::{LinearSolid, Moduli};
 use crate::physics::elasticity::moduli::{self, Hypothesis};
-use crate::physics::elasticity::state_based::{self, StateBased};
+use crate::physics::elasticity::surface::{correction_by_energy, correction_by_volume, surface_effect};
+use crate::physics::elasticity::{Bonds, Elasticity, Material, On};
 use crate::physics::failure::CriticalStretch;
 use crate::problem::Problem;
 use crate::simulation::{Leg, Model, Simulation, Stepper};
@@ -101,21 +103,35 @@ struct Builder<'a, const D: usize> {
 
 impl<const D: usize> Builder<'_, D> {
     fn simulation(&self) -> Result<Simulation> {
-        let law = &self.case.value.physics.elasticity.law;
-        let parameters = law.parameters();
-        match law {
-            Law::BondBased(_) | Law::StateBased(_) => self.with_law(bond_based::BondBased, &parameters),
-            Law::BondBasedLinear(_) | Law::StateBasedLinear(_) => {
-                self.with_law(bond_based::BondBasedLinear, &parameters)
-            }
+        match self.case.value.discretization.precision {
+            Precision::Double => self.in_precision::<Double>(),
+            Precision::Single => self.in_precision::<Single>(),
+            Precision::Mixed => self.in_precision::<Mixed>(),
         }
     }
 
-    fn with_law<L: BondLaw<D> + 'static>(&self, law: L, parameters: &BondBased) -> Result<Simulation> {
-        match self.case.value.discretization.precision {
-            Precision::Double => self.in_precision::<L, Double>(law, parameters),
-            Precision::Single => self.in_precision::<L, Single>(law, parameters),
-            Precision::Mixed => self.in_precision::<L, Mixed>(law, parameters),
+    /// The bonds of the law of the case.
+    fn bonds<P: Packs>(&self) -> Box<dyn Material<D, P>> {
+        if self.case.value.physics.elasticity.law.is_linear() {
+            Box::new(Bonds(LinearBonds))
+        } else {
+            Box::new(Bonds(NonlinearBonds))
+        }
+    }
+
+    /// The material of the case on a body.
+    fn material<P: Packs>(
+        &self,
+        solid: Option<Moduli>,
+        body: &Body<D>,
+        operator: &Operator,
+    ) -> Box<dyn Material<D, P>> {
+        let Some(moduli) = solid else { return self.bonds() };
+        let weights = &operator.weights;
+        if self.case.value.physics.elasticity.law.is_linear() {
+            Box::new(LinearSolid::new(LinearBonds, moduli, body, weights))
+        } else {
+            Box::new(LinearSolid::new(NonlinearBonds, moduli, body, weights))
         }
     }
 
@@ -128,11 +144,8 @@ impl<const D: usize> Builder<'_, D> {
         refuse(self.case, vec![if help.is_empty() { diagnostic } else { diagnostic.help(help) }])
     }
 
-    fn in_precision<L, P>(&self, law: L, parameters: &BondBased) -> Result<Simulation>
-    where
-        L: BondLaw<D> + 'static,
-        P: Packs,
-    {
+    fn in_precision<P: Packs>(&self) -> Result<Simulation> {
+        let parameters = &self.case.value.physics.elasticity.law.parameters();
         let case = &self.case.value;
         let shape = self.shape()?;
         let cracks = self.cracks()?;
@@ -155,7 +168,7 @@ impl<const D: usize> Builder<'_, D> {
             .elasticity
             .law
             .is_state_based()
-            .then(|| state_based::Moduli::new(hypothesis, parameters.young, parameters.poisson.unwrap_or(0.0)));
+            .then(|| Moduli::new(hypothesis, parameters.young, parameters.poisson.unwrap_or(0.0)));
         let strength = match &solid {
             Some(solid) => solid.strength(&influence, horizon),
             None => moduli::micromodulus(hypothesis, &influence, parameters.young, horizon),
@@ -172,17 +185,16 @@ impl<const D: usize> Builder<'_, D> {
             let lattice = standard::body(std::mem::replace(&mut cloud, adaptation.cells.cloud()), horizon, rule);
             if adaptation.criteria.is_some() {
                 let operator = Operator::standard(&lattice, strength, influence, rule);
-                let physics =
-                    Elasticity { law, density: parameters.density, operator, failure: None, state_based: None };
-                finest_step = physics.stable_step(&lattice) / f64::from(1u32 << adaptation.cells.levels);
+                let mut on = On { body: &lattice, operator: &operator, failure: None, exec: &mut Exec::default() };
+                let step = self.bonds::<P>().stable_step(&mut on, parameters.density);
+                finest_step = step / f64::from(1u32 << adaptation.cells.levels);
             }
         }
         let mut correction = None;
         if adaptation.is_none() && case.discretization.surface_correction != SurfaceCorrection::None {
             let body = standard::body(cloud, horizon, rule);
             let operator = Operator::standard(&body, strength, influence, rule);
-            let physics = Elasticity { law, density: parameters.density, operator, failure: None, state_based: None };
-            correction = self.correction(&physics, &body, &scaling);
+            correction = self.correction::<P>(&body, &operator, &scaling);
             cloud = body.cloud;
             // Every bond has a weight of its own now, as on a cloud.
             if let Arrangement::Lattice(_) = cloud.arrangement {
@@ -220,32 +232,30 @@ impl<const D: usize> Builder<'_, D> {
                     log::warn!("{}", self.source().warning("refinement.buffer", message).help(help));
                 }
                 let operator = scaling.operator(&body, &Update::default(), None, None);
-                let physics =
-                    Elasticity { law, density: parameters.density, operator, failure: None, state_based: None };
-                let operator = match self.correction(&physics, &body, &scaling) {
-                    None => physics.operator,
+                let operator = match self.correction::<P>(&body, &operator, &scaling) {
+                    None => operator,
                     correction => scaling.operator(&body, &Update::default(), None, correction.as_ref()),
                 };
                 (body, operator)
             }
         };
-        let state_based = solid.map(|solid| StateBased::new(solid, L::LINEAR, &body, &operator.weights));
-        let mut physics = Elasticity { law, density: parameters.density, operator, failure, state_based };
         let settings = match &case.discretization.scheme {
             Scheme::Hybrid(settings) => Some(settings),
             Scheme::Standard => None,
         };
+        let material = self.material::<P>(solid, &body, &operator);
+        let mut elasticity = Elasticity::new(body, operator, material, parameters.density, failure);
         if settings.is_some_and(|settings| settings.rescale) {
-            hybrid::rescale(&mut physics, &body, &scaling);
+            hybrid::rescale(&mut elasticity, &scaling);
         }
-        let surface = physics.surface_effect(&body, &scaling);
-        let mut state = physics.initial_state::<D, P>(&body);
-        let mut n_cut = 0;
+        let (material, mut on, _) = elasticity.parts();
+        let surface = surface_effect(material, &mut on, &scaling);
         for crack in &cracks {
-            n_cut += state.states.cut(&body, crack, tolerance);
+            elasticity.cut(crack, tolerance);
         }
-        let (mut prescribed, mut loads) = (Vec::new(), Vec::new());
+        let (mut constraints, mut terms) = (Vec::new(), Vec::new());
         for (k, condition) in case.conditions.iter().enumerate() {
+            let Elasticity { body, state, .. } = &mut elasticity;
             let slots = self.slots(&condition.on, &body.cloud, &format!("conditions[{k}].on"))?;
             if let Some(motion) = &condition.initial {
                 let (flat, component, value) = match motion {
@@ -257,22 +267,18 @@ impl<const D: usize> Builder<'_, D> {
                 initial::apply(components_mut::<D, _>(flat)[component], &slots, &mut profile);
             }
             if let Some(motion) = &condition.prescribe {
-                prescribed.push(self.prescribed(k, motion, &body.cloud, slots.clone())?);
+                constraints.push(self.prescribed(k, motion, &body.cloud, slots.clone())?);
             }
             if let Some(load) = &condition.load {
-                self.load(k, load, &body.cloud, shape.as_ref(), &slots, &mut loads)?;
+                self.load(k, load, &body.cloud, shape.as_ref(), &slots, &mut terms)?;
             }
         }
         let bar_speed = (parameters.young / parameters.density).sqrt();
-        let hybrid = match settings {
-            Some(settings) => Some(self.hybrid(settings, &body, &physics, &state, &scaling, horizon / bar_speed)?),
-            None => None,
-        };
-        let mut stable_step = physics.stable_step(&body).min(finest_step);
-        if let Some(hybrid) = &hybrid {
-            stable_step = hybrid.stable_step(physics.density, stable_step);
+        if let Some(settings) = settings {
+            elasticity = self.hybridise(settings, elasticity, solid, &scaling, horizon / bar_speed)?;
         }
-        let smallest = physics.failure.as_ref().map(CriticalStretch::smallest).filter(|s| s.is_finite());
+        let stable_step = elasticity.stable_step().min(finest_step);
+        let smallest = elasticity.failure.as_ref().map(CriticalStretch::smallest).filter(|s| s.is_finite());
         let facts = Facts {
             dimension: D,
             points: 0,
@@ -291,29 +297,21 @@ impl<const D: usize> Builder<'_, D> {
             surface,
             memory: 0,
         };
-        let mut problem = Problem::new(body, physics, state, prescribed, loads, n_cut);
         if let Some(adaptation) = adaptation {
-            problem.adapting(adaptation);
+            elasticity.adapting(adaptation);
         }
-        if let Some(hybrid) = hybrid {
-            problem.hybridise(hybrid);
-        }
+        let mut problem = Problem::new(Box::new(elasticity), constraints, terms);
         problem.is_static = self.case.value.solver.stages().next().is_some_and(|(_, first)| !moves(first));
-        let model = Model::new(problem, facts);
-        self.finish(Box::new(model))
+        self.finish(Box::new(Model::new(problem, facts)))
     }
 
     /// What corrects the surfaces of this body, if asked.
-    fn correction<L: BondLaw<D>>(
-        &self,
-        physics: &Elasticity<L>,
-        body: &Body<D>,
-        scaling: &Scaling,
-    ) -> Option<Correction<D>> {
+    fn correction<P: Packs>(&self, body: &Body<D>, operator: &Operator, scaling: &Scaling) -> Option<Correction<D>> {
+        let mut on = On { body, operator, failure: None, exec: &mut Exec::default() };
         match self.case.value.discretization.surface_correction {
             SurfaceCorrection::None => None,
-            SurfaceCorrection::Volume => Some(physics.correction_by_volume(body, scaling)),
-            SurfaceCorrection::Energy => Some(physics.correction_by_energy(body, scaling)),
+            SurfaceCorrection::Volume => Some(correction_by_volume(&mut on, scaling)),
+            SurfaceCorrection::Energy => Some(correction_by_energy(&*self.bonds::<P>(), &mut on, scaling)),
         }
     }
 

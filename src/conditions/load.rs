@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
-use super::Profile;
+use super::{Booked, Profile, Scale, Term, Volumes};
 use crate::field::Number;
+use crate::refinement::Remap;
+use crate::unknown::{Component, Unknown, with};
+use crate::visit::Visitor;
 
 /// A force density on one component at the points of a set, b(x, t) in N/m³.
 ///
@@ -18,96 +21,107 @@ pub struct Load {
     pub scale: Scale,
     /// Acts while t ≤ until, s.
     pub until: f64,
-    /// Force density and displacement at the last evaluation: what the work of the load is computed from.
-    pub last: Option<Last>,
-}
-
-/// What the profile of a load is multiplied with.
-#[derive(Debug, Clone)]
-pub enum Scale {
-    Same(f64),
-    /// One factor a point of the set.
-    ByPoint(Vec<f64>),
-}
-
-impl Scale {
-    /// Of point `k` of the set.
-    fn of(&self, k: usize) -> f64 {
-        match self {
-            Scale::Same(s) => *s,
-            Scale::ByPoint(s) => s[k],
-        }
-    }
-}
-
-/// The state of a load at the last evaluation.
-#[derive(Debug, Clone)]
-pub struct Last {
-    pub force: Vec<f64>,
-    pub displacement: Vec<f64>,
-}
-
-/// Work (J) and impulse (N·s) that a load did over a step.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Done {
-    pub work: f64,
-    pub impulse: f64,
+    /// Of the points of the set.
+    volume: Scale,
+    /// Force density and displacement at the last evaluation: what the work of the load is computed from. Empty before the
+    /// first.
+    force: Vec<f64>,
+    displacement: Vec<f64>,
 }
 
 impl Load {
-    /// Calls `visit` with each slot of the set and b(x, t) there, N/m³.
-    pub fn each(&mut self, t: f64, mut visit: impl FnMut(usize, f64)) {
-        if t > self.until {
-            return;
-        }
-        let (scale, slots) = (&self.scale, &self.slots);
-        for (k, (&slot, value)) in slots.iter().zip(self.profile.at(t)).enumerate() {
-            visit(slot as usize, scale.of(k) * value);
-        }
+    /// Acts for ever, with `scale` 1.
+    pub fn new(slots: Arc<[u32]>, component: usize, profile: Profile) -> Self {
+        let (scale, volume) = (Scale::Same(1.0), Scale::Same(1.0));
+        let (force, displacement) = (Vec::new(), Vec::new());
+        Load { slots, component, profile, scale, until: f64::INFINITY, volume, force, displacement }
     }
 
-    /// Adds b(x, t) to one component of the force density, and returns the work and impulse since the last call, by
-    /// the trapezoidal rule in time, which is what velocity Verlet does to momentum and, to second order, to energy.
-    pub fn apply<T: Number>(
-        &mut self,
-        t: f64,
-        dt: f64,
-        displacement: &[T],
-        force: &mut [T],
-        volume: impl Fn(usize) -> f64,
-    ) -> Done {
+    fn apply<T: Number>(&mut self, t: f64, dt: f64, displacement: &[T], force: &mut [T]) -> Booked {
         let active = t <= self.until;
         let values = self.profile.at(t);
-        let mut done = Done::default();
-        let first = self.last.is_none();
-        let last = self.last.get_or_insert_with(|| Last {
-            force: vec![0.0; self.slots.len()],
-            displacement: vec![0.0; self.slots.len()],
-        });
+        let mut booked = Booked { component: self.component, ..Booked::default() };
+        let first = self.force.is_empty();
+        self.force.resize(self.slots.len(), 0.0);
+        self.displacement.resize(self.slots.len(), 0.0);
         for (k, &slot) in self.slots.iter().enumerate() {
             let slot = slot as usize;
             let b = if active { self.scale.of(k) * values[k] } else { 0.0 };
             let u = displacement[slot].to_f64();
             if !first {
-                let mean = 0.5 * (last.force[k] + b) * volume(slot);
-                done.work += mean * (u - last.displacement[k]);
-                done.impulse += mean * dt;
+                let mean = 0.5 * (self.force[k] + b) * self.volume.of(k);
+                booked.work += mean * (u - self.displacement[k]);
+                booked.impulse += mean * dt;
             }
             force[slot] = T::from_f64(force[slot].to_f64() + b);
-            last.force[k] = b;
-            last.displacement[k] = u;
+            self.force[k] = b;
+            self.displacement[k] = u;
         }
-        done
+        booked
     }
 
-    /// Work and impulse of the force that was last added, over `weight` (s) of the motion with these velocities.
-    pub fn book<T: Number>(&self, weight: f64, velocity: &[T], volume: impl Fn(usize) -> f64) -> Done {
-        let mut done = Done::default();
-        for (&slot, b) in self.slots.iter().zip(self.last.iter().flat_map(|last| &last.force)) {
-            let impulse = weight * b * volume(slot as usize);
-            done.impulse += impulse;
-            done.work += impulse * velocity[slot as usize].to_f64();
+    fn act<T: Number>(&self, weight: f64, velocity: &[T]) -> Booked {
+        let mut booked = Booked { component: self.component, ..Booked::default() };
+        for (k, (&slot, b)) in self.slots.iter().zip(&self.force).enumerate() {
+            let impulse = weight * b * self.volume.of(k);
+            booked.impulse += impulse;
+            if let Some(v) = velocity.get(slot as usize) {
+                booked.work += impulse * v.to_f64();
+            }
         }
-        done
+        booked
+    }
+}
+
+impl Term for Load {
+    fn add(&mut self, t: f64, dt: f64, to: &mut Unknown<'_>) -> Booked {
+        with!(to, vectors => {
+            let Component { value, rate, .. } = vectors.component(self.component, to.components);
+            self.apply(t, dt, value, rate)
+        })
+    }
+
+    fn book(&self, weight: f64, of: &mut Unknown<'_>) -> Booked {
+        with!(of, vectors => self.act(weight, vectors.component(self.component, of.components).velocity))
+    }
+
+    fn restart(&mut self) {
+        self.force.clear();
+        self.displacement.clear();
+    }
+
+    fn force(&mut self, t: f64, load: &mut [f64], n: usize) {
+        if t > self.until {
+            return;
+        }
+        let component = &mut load[self.component * n..][..n];
+        for (k, (&slot, value)) in self.slots.iter().zip(self.profile.at(t)).enumerate() {
+            component[slot as usize] += self.scale.of(k) * value;
+        }
+    }
+
+    fn measure(&mut self, volumes: Volumes<'_>) {
+        self.volume = volumes(&self.slots);
+    }
+
+    fn remap(&mut self, remap: &Remap) {
+        let slots = remap.members(&self.slots);
+        if let Scale::ByPoint(factors) = &mut self.scale {
+            let cell = |k: &u32| remap.origins[*k as usize].cell();
+            let place = |k: &u32| self.slots.partition_point(|&slot| (slot as usize) < cell(k));
+            *factors = slots.iter().map(|k| factors[place(k)]).collect();
+        }
+        self.slots = slots.into();
+        self.profile = self.profile.on(&remap.positions, &self.slots);
+        self.restart();
+    }
+
+    fn first_bad(&self) -> Option<(String, f64)> {
+        self.profile.first_bad().map(|(_, value)| (self.profile.source().to_string(), value))
+    }
+
+    fn visit(&mut self, visitor: &mut dyn Visitor) {
+        visitor.doubles("load", &mut self.force);
+        visitor.doubles("load_displacement", &mut self.displacement);
     }
 }

@@ -1,6 +1,7 @@
 //! What the world does to a body: initial values, prescribed motion, loads.
 //!
-//! A condition of the case is compiled against a body into one of two primitives: [`Prescribed`] values and [`Load`]s.
+//! A condition of the case is compiled against a body into one of two things: a [`Constraint`] sets values, a [`Term`] adds
+//! to the rate. Both speak one dialect whatever solver asks, and say what they did: that is booked.
 
 pub mod initial;
 pub mod load;
@@ -10,3 +11,120 @@ pub mod profile;
 pub use load::Load;
 pub use prescribed::{Prescribed, Quantity};
 pub use profile::Profile;
+
+use crate::refinement::Remap;
+use crate::unknown::Unknown;
+use crate::visit::Visitor;
+
+/// When, within a step of a solver, a constraint is asked to act.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stage {
+    /// A solver in time begins: set what holds from time `t` on.
+    Start,
+    /// The rate of what was set at the start is there.
+    Evaluated,
+    /// Points have been replaced, and their rate is there.
+    Replaced,
+    /// After a drift from `t` over `dt`: set the velocities of the step, and the values to which they lead.
+    Drift,
+    /// After the last kick of a step of `dt` that ends at `t`: set the velocities there, and book the step.
+    Finish,
+    /// At a stage at time `t` of a step of `dt` that ends at `end`, from which other stages lead.
+    Within { end: f64 },
+    /// At the end `t` of a step of `dt` that had such stages: set the values there, and book the change of motion.
+    Arrive,
+}
+
+/// A stage of a step.
+#[derive(Debug, Clone, Copy)]
+pub struct Instant {
+    pub stage: Stage,
+    /// s
+    pub t: f64,
+    pub dt: f64,
+    /// c, 1/s, of damping proportional to mass.
+    pub damping: f64,
+}
+
+/// Work (J) and impulse (N·s) of what a condition did; of what diffuses, the impulse is the amount that came in.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Booked {
+    pub work: f64,
+    pub impulse: f64,
+    /// Of the impulse.
+    pub component: usize,
+}
+
+/// A number for each point of a set, often the same.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Scale {
+    Same(f64),
+    ByPoint(Vec<f64>),
+}
+
+impl Scale {
+    /// Of point `k` of the set.
+    pub fn of(&self, k: usize) -> f64 {
+        match self {
+            Scale::Same(s) => *s,
+            Scale::ByPoint(s) => s[k],
+        }
+    }
+}
+
+/// The volumes of the points of a set, by its slots.
+pub type Volumes<'a> = &'a dyn Fn(&[u32]) -> Scale;
+
+/// Sets values at the points of a set, in one component, and knows what that takes.
+///
+/// u_p = g(x, t); later u_p = Σ c_q u_q + g(x, t).
+pub trait Constraint: Send {
+    /// Of the column of its reaction.
+    fn name(&self) -> &str;
+    /// Component and slots.
+    fn on(&self) -> (usize, &[u32]);
+    /// Does what a stage asks for.
+    fn impose(&mut self, at: &Instant, on: &mut Unknown<'_>) -> Booked;
+    /// Takes off what all other forces do over `weight` (s) of what acts now, in a step that ends at `at.t`.
+    fn book(&mut self, weight: f64, at: &Instant, on: &mut Unknown<'_>) -> Booked;
+
+    /// Whether it holds in a load step that ends at `t`.
+    fn holds(&self, t: f64) -> bool;
+    /// Of a body at rest: how far its unknowns still have to go over a load step, from `u`; `n` slots.
+    fn way(&mut self, over: [f64; 2], u: &[f64], way: &mut [f64], n: usize);
+    /// Takes note of the force that it takes, N.
+    fn react(&mut self, reaction: f64);
+    /// Force that it exerts on the body, mean over the last step, N.
+    fn reaction(&self) -> f64;
+
+    /// Takes note of the volumes of its points.
+    fn measure(&mut self, volumes: Volumes<'_>);
+    /// Points have been replaced.
+    fn remap(&mut self, remap: &Remap);
+    /// A formula that gave something that is not finite, and what.
+    fn first_bad(&self) -> Option<(String, f64)>;
+    /// Shows everything that changes in a run.
+    fn visit(&mut self, visitor: &mut dyn Visitor);
+}
+
+/// Adds to the rate: a load, a source.
+pub trait Term: Send {
+    /// Adds its part at time `t`. Gives work and impulse of the last `dt`, by the trapezoidal rule in time, which is what
+    /// velocity Verlet does to momentum and, to second order, to energy.
+    fn add(&mut self, t: f64, dt: f64, to: &mut Unknown<'_>) -> Booked;
+    /// Work and impulse of what was last added, over `weight` (s) of the motion as it is.
+    fn book(&self, weight: f64, of: &mut Unknown<'_>) -> Booked;
+    /// What it added before does not lead to what it adds next.
+    fn restart(&mut self);
+    /// Adds its force density at time `t` to those of a body at rest; `n` slots.
+    fn force(&mut self, t: f64, load: &mut [f64], n: usize);
+
+    /// Takes note of the volumes of its points.
+    fn measure(&mut self, volumes: Volumes<'_>);
+    /// Points have been replaced.
+    fn remap(&mut self, remap: &Remap);
+    /// A formula that gave something that is not finite, and what.
+    fn first_bad(&self) -> Option<(String, f64)>;
+    /// Shows everything that changes in a run.
+    fn visit(&mut self, visitor: &mut dyn Visitor);
+}

@@ -27,13 +27,23 @@ impl Profile {
             }
             slots.iter().map(|&slot| embed(&cloud.position(slot as usize))[axis]).collect()
         });
+        Profile::with(expression, columns, slots)
+    }
+
+    fn with(expression: Expression, columns: [Vec<f64>; 3], slots: &Arc<[u32]>) -> Self {
         let moves = expression.uses("t");
         Profile { expression, columns, values: vec![0.0; slots.len()], moves, ready: false }
     }
 
-    /// The same formula at the points of another set.
-    pub fn on<const D: usize>(&self, cloud: &Cloud<D>, slots: &Arc<[u32]>) -> Self {
-        Profile::new(self.expression.clone(), cloud, slots)
+    /// The same formula at the points of another set. `positions` by slot, m.
+    pub fn on(&self, positions: &[[f64; 3]], slots: &Arc<[u32]>) -> Self {
+        let columns = std::array::from_fn(|axis| {
+            if !self.expression.uses(VARIABLES[axis]) {
+                return vec![0.0];
+            }
+            slots.iter().map(|&slot| positions[slot as usize][axis]).collect()
+        });
+        Profile::with(self.expression.clone(), columns, slots)
     }
 
     /// The values at time `t`, in the order of the set.

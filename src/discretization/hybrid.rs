@@ -4,11 +4,12 @@
 //! that points near boundaries, cracks and whatever is about to break sum their bonds. A point goes from its row to its
 //! bonds, never back.
 //!
-//! Deliberately absent: the rows themselves (`collocation`), and what makes a point go over (`problem::hybrid`).
+//! Deliberately absent: the rows themselves (`collocation`), and what makes a point go over (`physics::elasticity::hybrid`).
 
 use crate::family::{Body, BondStates, Families};
 use crate::geometry::lattice::BLOCK;
 use crate::geometry::{Arrangement, Lattice};
+use crate::visit::Visitor;
 
 /// Which scheme holds at which point.
 #[derive(Debug, Clone)]
@@ -155,6 +156,18 @@ impl Regions {
     /// Points that have a row.
     pub fn collocated_points(&self) -> usize {
         self.collocated_points
+    }
+
+    /// Shows everything but which points there are.
+    pub fn visit(&mut self, visitor: &mut dyn Visitor) {
+        visitor.words("points_with_rows", &mut self.rows);
+        visitor.words("points_whose_families_were_switched", &mut self.settled);
+        visitor.indices("blocks_with_bonds", &mut self.standard);
+        visitor.indices("blocks_with_rows", &mut self.collocated);
+        visitor.indices("blocks_with_both", &mut self.mixed);
+        let mut points = self.collocated_points as u64;
+        visitor.count("points_with_rows", &mut points);
+        self.collocated_points = points as usize;
     }
 
     /// Bytes that it takes.

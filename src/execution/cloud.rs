@@ -21,16 +21,14 @@ pub const CHUNK: usize = 512;
 
 /// Puts the input values of each point side by side, four of them and zeros behind; those beyond four stand in records of
 /// their own, behind the records of all points.
-pub fn gather_input<T: Number, const I: usize>(input: &[&[T]; I], records: &mut Vec<[T; 4]>) {
-    if I == 0 {
-        return;
-    }
-    let n = input[0].len();
-    records.resize(n * I.div_ceil(4), [T::default(); 4]);
+pub fn gather_input<T: Number>(input: &[&[T]], records: &mut Vec<[T; 4]>) {
+    let Some(first) = input.first() else { return };
+    let n = first.len();
+    records.resize(n * input.len().div_ceil(4), [T::default(); 4]);
     for (part, records) in records.chunks_mut(n.max(1)).enumerate() {
         records.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, records)| {
             for (k, record) in records.iter_mut().enumerate() {
-                for c in 4 * part..I.min(4 * part + 4) {
+                for c in 4 * part..input.len().min(4 * part + 4) {
                     record[c - 4 * part] = input[c][chunk * CHUNK + k];
                 }
             }
@@ -38,21 +36,29 @@ pub fn gather_input<T: Number, const I: usize>(input: &[&[T]; I], records: &mut 
     }
 }
 
+/// The values of a point whose family is summed, the same in every lane.
+struct Here<H, const I: usize, const A: usize> {
+    input: [H; I],
+    added: [H; A],
+}
+
 /// A sum over the families of a cloud.
-pub struct Sum<'a, const D: usize, const I: usize, const O: usize, P: Packs, K> {
+pub struct Sum<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K> {
     pub instructions: Instructions,
     pub families: &'a CloudFamilies,
     pub weights: &'a CloudWeights,
     pub profile: Profile<'a>,
     pub sites: SiteView<'a, P::Site>,
     pub states: StatesPointer,
-    /// The input values of a point side by side, as [`gather_input`] puts them.
+    /// The input values of a point side by side, and behind them those that are added, as [`gather_input`] puts them.
     pub input: &'a [[P::Field; 4]],
     pub output: [SharedSlice<P::Field>; O],
     pub kernel: &'a K,
 }
 
-impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, I, O>> Sum<'_, D, I, O, P, K> {
+impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K: BondKernel<D, I, O, A>>
+    Sum<'_, D, I, A, O, P, K>
+{
     /// Sums the families of a range of points.
     pub fn run<R: BreakRule<D>>(&self, points: Range<usize>, rule: &R) -> Broken {
         let threshold = rule.threshold();
@@ -103,15 +109,15 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
             }
             for part in 0..GROUP / V::LANES {
                 let mask = word >> (part * V::LANES);
-                let (bond, relative) = unsafe { self.bond::<V, PLAIN>(point, group, part, &here, mask) };
+                let (bond, relative, added) = unsafe { self.bond::<V, PLAIN>(point, group, part, &here, mask) };
                 let strain = self.kernel.strain(&bond, &relative);
                 watch = watch.larger(strain);
                 let sum = &mut sums[part];
                 let start = if K::RELATIVE { *sum } else { [V::splat(0.0); O] };
                 let mut value = if SMALL {
-                    self.kernel.add_small(&bond, &relative, strain, start)
+                    self.kernel.add_small(&bond, &relative, &added, strain, start)
                 } else {
-                    self.kernel.add(&bond, &relative, strain, start)
+                    self.kernel.add(&bond, &relative, &added, strain, start)
                 };
                 if !K::RELATIVE {
                     for c in 0..O {
@@ -149,7 +155,7 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         for group in self.groups(point) {
             let word = unsafe { &mut *self.words().add(group) };
             for part in 0..GROUP / V::LANES {
-                let (bond, relative) =
+                let (bond, relative, _) =
                     unsafe { self.bond::<V, false>(point, group, part, &here, *word >> (part * V::LANES)) };
                 let strain = self.kernel.strain(&bond, &relative);
                 if strain.largest() <= threshold {
@@ -231,14 +237,22 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
     }
 
     #[inline(always)]
-    unsafe fn here<V: Ends<P::Field>>(&self, point: usize) -> [V::Held; I] {
-        let mut held = [V::NOTHING; I];
-        for c in 0..I {
+    unsafe fn here<V: Ends<P::Field>>(&self, point: usize) -> Here<V::Held, I, A> {
+        let value = |c: usize| {
             let record = point + c / 4 * self.n_points();
-            let value = unsafe { self.input.get_unchecked(record) }[c % 4];
-            held[c] = if c >= I - K::ADDED { V::opposite(V::same(value)) } else { V::same(value) };
+            // SAFETY: `gather_input` has made records for all values.
+            let values = unsafe { self.input.get_unchecked(record) };
+            values[c % 4]
+        };
+        let mut here = Here { input: [V::NOTHING; I], added: [V::NOTHING; A] };
+        for c in 0..I {
+            here.input[c] = V::same(value(c));
         }
-        held
+        for c in 0..A {
+            // What is relative to the opposite is the sum.
+            here.added[c] = V::opposite(V::same(value(I + c)));
+        }
+        here
     }
 
     /// One part of a group of bonds, and the relative values of their ends.
@@ -248,9 +262,9 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         point: usize,
         group: usize,
         part: usize,
-        here: &[V::Held; I],
+        here: &Here<V::Held, I, A>,
         mask: u16,
-    ) -> (Bond<D, V>, [V; I])
+    ) -> (Bond<D, V>, [V; I], [V; A])
     where
         V: Pack<P::Bond> + Ends<P::Field> + Between<P::Site>,
     {
@@ -274,19 +288,17 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         let length = square * inverse;
         let weight = self.weigh::<V, PLAIN>(first, length, volume);
         let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring: weight * inverse };
-        let mut relative = [V::splat(0.0); I];
-        if I > 0 {
-            let there = unsafe { V::gather(self.input.as_ptr(), index) };
-            for c in 0..I.min(4) {
-                relative[c] = V::relative(there[c], here[c], mask);
-            }
-            if I > 4 {
-                let there = unsafe { V::gather(self.input.as_ptr().add(self.n_points()), index) };
-                for c in 4..I {
-                    relative[c] = V::relative(there[c - 4], here[c], mask);
+        let (mut relative, mut added) = ([V::splat(0.0); I], [V::splat(0.0); A]);
+        for part in 0..(I + A).div_ceil(4) {
+            let there = unsafe { V::gather(self.input.as_ptr().add(part * self.n_points()), index) };
+            for c in 4 * part..(I + A).min(4 * part + 4) {
+                if c < I {
+                    relative[c] = V::relative(there[c - 4 * part], here.input[c], mask);
+                } else {
+                    added[c - I] = V::relative(there[c - 4 * part], here.added[c - I], mask);
                 }
             }
         }
-        (bond, relative)
+        (bond, relative, added)
     }
 }

@@ -3,12 +3,12 @@
 //! Beside the force, the displacements at the nearest points tell how far the family is strained, without a look at its
 //! bonds.
 
-mod behind;
+mod fused;
 mod slopes;
 
 use rayon::prelude::*;
 
-pub use behind::Motion;
+pub use fused::Motion;
 
 use super::packs::{Ends, Instructions, Pack, Packs};
 use super::{Exec, SharedSlice};
@@ -187,7 +187,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
             let mut found = Vec::new();
             for &block in blocks {
                 let slot = self.lattice.guard + block as usize * BLOCK;
-                behind::note(&mut found, slot, work(slot));
+                fused::note(&mut found, slot, work(slot));
             }
             found
         });

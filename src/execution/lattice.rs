@@ -78,16 +78,19 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
 }
 
 /// A sum over the blocks of a lattice.
-pub struct Sum<'a, const D: usize, const I: usize, const O: usize, P: Precision, K> {
+pub struct Sum<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Precision, K> {
     pub instructions: Instructions,
     pub view: &'a View<'a, D, P::Bond>,
     pub states: StatesPointer,
     pub input: [&'a [P::Field]; I],
+    pub added: [&'a [P::Field]; A],
     pub output: [SharedSlice<P::Field>; O],
     pub kernel: &'a K,
 }
 
-impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, I, O>> Sum<'_, D, I, O, P, K> {
+impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K: BondKernel<D, I, O, A>>
+    Sum<'_, D, I, A, O, P, K>
+{
     /// Sums the blocks of one chunk.
     pub fn run<R: BreakRule<D>>(&self, chunk: usize, rule: &R) -> Broken {
         let StatesPointer(words) = self.states;
@@ -133,7 +136,7 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
         for part in 0..BLOCK / V::LANES {
             let first = slot + part * V::LANES;
             // SAFETY: the slots of a block are inside the input.
-            let here = unsafe { self.hold::<V>(first) };
+            let (here, own) = unsafe { (self.hold::<V, I>(&self.input, first), self.hold_own::<V>(first)) };
             let mut total = [V::splat(0.0); O];
             // Partial sums that wait for their mirror image, by the number of sequences in them.
             let mut waiting = [[V::splat(0.0); O]; 4];
@@ -146,14 +149,15 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
                         unsafe {
                             let bond = self.bond::<V>(k);
                             let mask = *words.get_unchecked(k) >> (part * V::LANES);
-                            let relative = self.relative::<V>(k, first, &here, mask);
+                            let relative = self.relative::<V, I>(&self.input, k, first, &here, mask);
+                            let added = self.relative::<V, A>(&self.added, k, first, &own, mask);
                             let strain = self.kernel.strain(&bond, &relative);
                             watch = watch.larger(strain);
                             let start = if K::RELATIVE { sum } else { [V::splat(0.0); O] };
                             let mut value = if SMALL {
-                                self.kernel.add_small(&bond, &relative, strain, start)
+                                self.kernel.add_small(&bond, &relative, &added, strain, start)
                             } else {
-                                self.kernel.add(&bond, &relative, strain, start)
+                                self.kernel.add(&bond, &relative, &added, strain, start)
                             };
                             if !K::RELATIVE {
                                 for c in 0..O {
@@ -199,8 +203,8 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
                 let mask = *word >> (part * V::LANES);
                 // SAFETY: as in `sum_on`.
                 let strain = unsafe {
-                    let here = self.hold::<V>(first);
-                    let relative = self.relative::<V>(k, first, &here, mask);
+                    let here = self.hold::<V, I>(&self.input, first);
+                    let relative = self.relative::<V, I>(&self.input, k, first, &here, mask);
                     self.kernel.strain(&self.bond::<V>(k), &relative)
                 };
                 if strain.largest() <= threshold {
@@ -224,29 +228,37 @@ impl<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, 
     }
 
     #[inline(always)]
-    unsafe fn hold<V: Ends<P::Field>>(&self, first: usize) -> [V::Held; I] {
-        let mut held = [V::NOTHING; I];
-        for c in 0..I {
-            held[c] = unsafe { V::hold(self.input[c].as_ptr().add(first)) };
-            if c >= I - K::ADDED {
-                held[c] = V::opposite(held[c]);
-            }
+    unsafe fn hold<V: Ends<P::Field>, const N: usize>(&self, values: &[&[P::Field]; N], first: usize) -> [V::Held; N] {
+        let mut held = [V::NOTHING; N];
+        for c in 0..N {
+            held[c] = unsafe { V::hold(values[c].as_ptr().add(first)) };
+        }
+        held
+    }
+
+    /// The values that are added, with the other sign: what is relative to them is the sum.
+    #[inline(always)]
+    unsafe fn hold_own<V: Ends<P::Field>>(&self, first: usize) -> [V::Held; A] {
+        let mut held = unsafe { self.hold::<V, A>(&self.added, first) };
+        for c in 0..A {
+            held[c] = V::opposite(held[c]);
         }
         held
     }
 
     #[inline(always)]
-    unsafe fn relative<V: Pack<P::Bond> + Ends<P::Field>>(
+    unsafe fn relative<V: Pack<P::Bond> + Ends<P::Field>, const N: usize>(
         &self,
+        values: &[&[P::Field]; N],
         k: usize,
         first: usize,
-        here: &[V::Held; I],
+        here: &[V::Held; N],
         mask: u16,
-    ) -> [V; I] {
-        let mut relative = [V::splat(0.0); I];
-        for c in 0..I {
+    ) -> [V; N] {
+        let mut relative = [V::splat(0.0); N];
+        for c in 0..N {
             unsafe {
-                let there = self.input[c].as_ptr().add(first).offset(self.view.rows.get_unchecked(k).shift);
+                let there = values[c].as_ptr().add(first).offset(self.view.rows.get_unchecked(k).shift);
                 relative[c] = V::relative(V::hold(there), here[c], mask);
             }
         }

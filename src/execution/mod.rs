@@ -64,6 +64,7 @@ use crate::discretization::BondWeights;
 use crate::family::{Body, Bond, BondKernel, BondStates, Families};
 use crate::field::Number;
 use crate::lane::Lane;
+use crate::visit::Visitor;
 pub use blocks::BlockRow;
 pub use collocation::{Limits, Motion};
 pub use packs::{Instructions, Packs};
@@ -183,6 +184,13 @@ impl Exec {
         within.extend_from_slice(blocks);
     }
 
+    /// Shows what [`Exec::within`] has set.
+    pub fn visit(&mut self, visitor: &mut dyn Visitor) {
+        if let Some(within) = &mut self.within {
+            visitor.indices("blocks_summed", within);
+        }
+    }
+
     /// output(x) = Σ kernel(bond, input(x), input(x′)) over the bonds of x that hold. Linear kernels are summed as rows
     /// on lattices, where the bonds of a block all hold.
     ///
@@ -198,7 +206,24 @@ impl Exec {
     ) {
         // SAFETY of the cast: with `Unbreakable` the loops never write to the states.
         let states = StatesPointer::shared(states);
-        self.pass::<D, I, O, P, _, _>(body, weights, states, input, output, kernel, &Unbreakable);
+        self.each_path::<D, I, 0, O, P, _, _>(body, weights, states, (input, []), output, kernel, &Unbreakable);
+    }
+
+    /// The same with values that are added instead of subtracted.
+    #[allow(clippy::too_many_arguments)] // as below
+    pub fn sum_bonds_adding<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs>(
+        &mut self,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &BondStates,
+        input: [&[P::Field]; I],
+        added: [&[P::Field]; A],
+        output: [&mut [P::Field]; O],
+        kernel: &impl BondKernel<D, I, O, A>,
+    ) {
+        // SAFETY of the cast: as above.
+        let states = StatesPointer::shared(states);
+        self.each_path::<D, I, A, O, P, _, _>(body, weights, states, (input, added), output, kernel, &Unbreakable);
     }
 
     /// As [`Exec::sum_bonds`], but bonds that `rule` breaks at these input values are broken first, at both ends.
@@ -213,22 +238,28 @@ impl Exec {
         kernel: &impl BondKernel<D, I, O>,
         rule: &impl BreakRule<D>,
     ) -> Broken {
-        self.pass::<D, I, O, P, _, _>(body, weights, StatesPointer::exclusive(states), input, output, kernel, rule)
+        let states = StatesPointer::exclusive(states);
+        self.each_path::<D, I, 0, O, P, _, _>(body, weights, states, (input, []), output, kernel, rule)
     }
 
     #[allow(clippy::too_many_arguments)]
-    fn pass<const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, I, O>, R: BreakRule<D>>(
+    fn each_path<const D: usize, const I: usize, const A: usize, const O: usize, P, K, R>(
         &mut self,
         body: &Body<D>,
         weights: &BondWeights,
         states: StatesPointer,
-        input: [&[P::Field]; I],
+        (input, added): ([&[P::Field]; I], [&[P::Field]; A]),
         output: [&mut [P::Field]; O],
         kernel: &K,
         rule: &R,
-    ) -> Broken {
+    ) -> Broken
+    where
+        P: Packs,
+        K: BondKernel<D, I, O, A>,
+        R: BreakRule<D>,
+    {
         let n = body.cloud.n_slots();
-        assert!(input.iter().all(|f| f.len() == n), "input fields have the length of the cloud");
+        assert!(input.iter().chain(&added).all(|f| f.len() == n), "input fields have the length of the cloud");
         assert!(output.iter().all(|f| f.len() == n), "output fields have the length of the cloud");
         let output = output.map(|f| SharedSlice(f.as_mut_ptr()));
         let instructions = self.instructions;
@@ -236,7 +267,7 @@ impl Exec {
             (Families::Lattice(families), BondWeights::Lattice(weights)) => {
                 let within = self.within.take();
                 let view = &lattice::View::new(body, families, weights, within.as_deref());
-                let sum = lattice::Sum::<D, I, O, P, _> { instructions, view, states, input, output, kernel };
+                let sum = lattice::Sum::<D, I, A, O, P, _> { instructions, view, states, input, added, output, kernel };
                 let broken = if K::LINEAR && R::NEVER {
                     let sum = rows::Sum::new(&sum);
                     self.each_chunk(view.n_chunks(), &|chunk| {
@@ -251,9 +282,10 @@ impl Exec {
             }
             (Families::Cloud(families), BondWeights::Cloud(weights)) => {
                 let mut records = std::mem::take(P::records(&mut self.double, &mut self.single));
-                cloud::gather_input(&input, &mut records);
+                let values: Vec<&[P::Field]> = input.iter().chain(&added).copied().collect();
+                cloud::gather_input(&values, &mut records);
                 let (sites, input) = (P::sites(&families.sites), &records[..]);
-                let sum = cloud::Sum::<D, I, O, P, _> {
+                let sum = cloud::Sum::<D, I, A, O, P, _> {
                     instructions,
                     families,
                     weights,

@@ -10,8 +10,8 @@ use crate::field::Number;
 use crate::geometry::lattice::BLOCK;
 
 /// A sum of a linear kernel over the blocks of a lattice.
-pub struct Sum<'a, const D: usize, const I: usize, const O: usize, P: Packs, K> {
-    pub bonds: &'a lattice::Sum<'a, D, I, O, P, K>,
+pub struct Sum<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K> {
+    pub bonds: &'a lattice::Sum<'a, D, I, A, O, P, K>,
     pub pairs: Vec<Pair<I, O, P::Bond>>,
     pub instructions: Instructions,
 }
@@ -23,9 +23,11 @@ pub struct Pair<const I: usize, const O: usize, B> {
     matrix: [[B; I]; O],
 }
 
-impl<'a, const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel<D, I, O>> Sum<'a, D, I, O, P, K> {
+impl<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K: BondKernel<D, I, O, A>>
+    Sum<'a, D, I, A, O, P, K>
+{
     /// Reads the matrices off the kernel: column by column, its values at unit vectors.
-    pub fn new(bonds: &'a lattice::Sum<'a, D, I, O, P, K>) -> Self {
+    pub fn new(bonds: &'a lattice::Sum<'a, D, I, A, O, P, K>) -> Self {
         let view = bonds.view;
         let pair = |k: usize| {
             let offset = &view.families.offsets[k];
@@ -34,7 +36,7 @@ impl<'a, const D: usize, const I: usize, const O: usize, P: Packs, K: BondKernel
             for i in 0..I {
                 let mut unit = [0.0; I];
                 unit[i] = 1.0;
-                let column = bonds.kernel.add(&bond, &unit, bonds.kernel.strain(&bond, &unit), [0.0; O]);
+                let column = bonds.kernel.add(&bond, &unit, &[0.0; A], bonds.kernel.strain(&bond, &unit), [0.0; O]);
                 for o in 0..O {
                     matrix[o][i] = P::Bond::from_f64(column[o]);
                 }

@@ -26,10 +26,12 @@ impl<const D: usize> Bond<D, f64> {
 
 /// A formula along a bond, summed over families by `execution`: the force of a law, its energy, a dilatation.
 ///
-/// `I` values are known at the two ends (displacement, and whatever a later pass of a law adds), `O` are summed.
+/// `I` values are known at the two ends by their difference (displacement), `A` by their sum (what an earlier pass has left
+/// there), and `O` are summed. The summand is linear in the weight of the bond, so that whatever scales a weight (volumes,
+/// surfaces, interfaces) scales the bond.
 /// A kernel allocates nothing and indexes nothing; it is the same source for one bond and for many side by side, in
 /// double and in single precision.
-pub trait BondKernel<const D: usize, const I: usize, const O: usize>: Sync {
+pub trait BondKernel<const D: usize, const I: usize, const O: usize, const A: usize = 0>: Sync {
     /// |strain| up to which [`BondKernel::add_small`] may stand for [`BondKernel::add`].
     const SMALL: f64 = f64::INFINITY;
     /// Whether there are two forms: where there is one, the other is not compiled.
@@ -39,29 +41,32 @@ pub trait BondKernel<const D: usize, const I: usize, const O: usize>: Sync {
     /// Whether the summand is zero where the ends have the same values. Broken bonds are given as such, which saves
     /// a mask; the summands of other kernels are masked.
     const RELATIVE: bool = true;
-    /// How many of the values, the last ones, are given as the sum of those at the two ends instead of their difference;
-    /// as zero along a broken bond.
-    const ADDED: usize = 0;
-
     /// What decides about breaking and about the form: computed once, whichever form follows. `relative`: values at
-    /// x′ less values at x, the last `ADDED` of them values at x′ and x added. Nothing, unless the kernel says otherwise.
+    /// x′ less values at x. Nothing, unless the kernel says otherwise.
     #[inline(always)]
     fn strain<L: Lane>(&self, _bond: &Bond<D, L>, _relative: &[L; I]) -> L {
         L::splat(0.0)
     }
 
-    /// `sum` and the summand of x, exactly.
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, relative: &[L; I], strain: L, sum: [L; O]) -> [L; O];
+    /// `sum` and the summand of x, exactly. `added`: values at x′ and x added; zero along a broken bond.
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, relative: &[L; I], added: &[L; A], strain: L, sum: [L; O]) -> [L; O];
 
     /// `sum` and the summand of x where |strain| ≤ `SMALL`, to the precision of the numbers.
     #[inline(always)]
-    fn add_small<L: Lane>(&self, bond: &Bond<D, L>, relative: &[L; I], strain: L, sum: [L; O]) -> [L; O] {
-        self.add(bond, relative, strain, sum)
+    fn add_small<L: Lane>(
+        &self,
+        bond: &Bond<D, L>,
+        relative: &[L; I],
+        added: &[L; A],
+        strain: L,
+        sum: [L; O],
+    ) -> [L; O] {
+        self.add(bond, relative, added, strain, sum)
     }
 }
 
 /// A bond law of elasticity: what a bond does when its ends move apart. η = u′ − u, m.
-pub trait BondLaw<const D: usize>: Copy + Send + Sync {
+pub trait BondLaw<const D: usize>: Copy + Send + Sync + 'static {
     /// |strain| up to which the small forms serve; infinite where there is one form only.
     const SMALL: f64 = f64::INFINITY;
     /// Whether the force is linear in η.

@@ -115,6 +115,12 @@ impl BondStates {
         words
     }
 
+    /// The same, to be shown and replaced.
+    pub fn vector(&mut self) -> &mut Vec<u16> {
+        let (BondStates::Lattice(words) | BondStates::Cloud(words)) = self;
+        words
+    }
+
     /// The slots of x and x′ of the bond whose state is bit `bit % 16` of word `bit / 16`.
     pub fn ends<const D: usize>(&self, body: &Body<D>, bit: usize) -> [usize; 2] {
         match (self, &body.families, &body.cloud.arrangement) {

@@ -10,7 +10,7 @@ use super::snapshot::Look;
 use super::source::Source;
 use super::table::Table;
 use crate::field::Values;
-use crate::problem::Balance;
+use crate::physics::Balance;
 use crate::solver::Clock;
 
 /// Makes the rows of `history.csv` and keeps the extremes that the report needs.
@@ -52,16 +52,11 @@ impl History {
     }
 
     /// The table that the rows go into.
-    pub fn table(&self, source: &dyn Source) -> Table {
+    pub fn table(&self, source: &mut dyn Source) -> Table {
         let dimension = source.facts().dimension;
         let axes = &["x", "y", "z"][..dimension];
-        let mut columns: Vec<String> =
-            ["step", "time", "kinetic", "strain", "fracture", "external", "damped", "imbalance", "broken_bonds"]
-                .map(String::from)
-                .into();
-        columns.extend(axes.iter().map(|a| format!("momentum_{a}")));
-        // About z in 2D; none in 1D.
-        columns.extend(["x", "y", "z"][angular(dimension)].iter().map(|a| format!("angular_momentum_{a}")));
+        let mut columns: Vec<String> = vec!["step".into(), "time".into()];
+        columns.extend(source.columns(&Balance::default()).into_iter().map(|column| column.name));
         if self.tip.is_some() {
             columns.extend(axes.iter().map(|a| format!("crack_tip_{a}")));
             columns.push("crack_tip_speed".into());
@@ -97,20 +92,8 @@ impl History {
             tip.look(look.source.positions(), damage, clock.time());
         }
         let dimension = look.source.facts().dimension;
-        let relative = if b.scale() > 0.0 { b.defect() / b.scale() } else { 0.0 };
-        let mut row = vec![
-            clock.step as f64,
-            clock.time(),
-            b.kinetic,
-            b.strain,
-            b.fracture,
-            b.external,
-            b.damped,
-            relative,
-            look.source.broken_pairs() as f64,
-        ];
-        row.extend(&b.momentum[..dimension]);
-        row.extend(&b.angular_momentum[angular(dimension)]);
+        let mut row = vec![clock.step as f64, clock.time()];
+        row.extend(look.source.columns(&b).into_iter().map(|column| column.value));
         if let Some(tip) = &self.tip {
             row.extend(&tip.position.unwrap_or([f64::NAN; 3])[..dimension]);
             row.push(tip.speed);
@@ -123,14 +106,5 @@ impl History {
         }
         row.extend(look.source.reactions().iter().map(|(_, value)| value));
         Some(row)
-    }
-}
-
-/// The components of angular momentum that exist in a dimension.
-fn angular(dimension: usize) -> std::ops::Range<usize> {
-    match dimension {
-        1 => 0..0,
-        2 => 2..3,
-        _ => 0..3,
     }
 }

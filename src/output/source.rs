@@ -5,9 +5,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::field::{Field, Values};
+use crate::physics::elasticity::Work;
 use crate::physics::elasticity::surface::SurfaceEffect;
-use crate::problem::hybrid::Work;
-use crate::problem::{Adapted, Balance};
+use crate::physics::{Adapted, Balance, Column};
 
 /// A model that outputs look at. Asking for a field may compute it, hence the `&mut`.
 pub trait Source {
@@ -24,6 +24,8 @@ pub trait Source {
     /// The same at one point only: a field of one value.
     fn field_at(&mut self, name: &str, point: usize) -> Option<Field>;
     fn balance(&mut self) -> Balance;
+    /// The books as columns of the history.
+    fn columns(&mut self, balance: &Balance) -> Vec<Column>;
     fn broken_pairs(&self) -> u64;
     /// Name and value (N) of the reaction of each prescribed set.
     fn reactions(&self) -> Vec<(String, f64)>;

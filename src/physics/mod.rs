@@ -1,8 +1,280 @@
-//! The physics that a body can have: laws, their states, and what is irreversible in them.
+//! The equations, and what never comes back: what a bond does, when it breaks, what diffuses.
+//!
+//! A [`Physics`] is one set of equations on one body, with everything that it changes. A problem holds one as a trait
+//! object: dimension, material and precision are types below this line and nowhere above it. It is called once a stage,
+//! never for a bond.
 
 pub mod diffusion;
 pub mod elasticity;
 pub mod failure;
 
+use std::ops::Range;
+
 pub use diffusion::Diffusion;
 pub use elasticity::Elasticity;
+
+use crate::execution::Broken;
+use crate::field::Field;
+use crate::refinement::Remap;
+use crate::solver::Drift;
+use crate::solver::linear::{LinearError, Preconditioner, Sparse};
+use crate::unknown::Unknown;
+use crate::visit::Visitor;
+
+/// One set of equations on one body.
+///
+/// What a stage needs is split by whether it comes back: [`evaluate`](Self::evaluate) fills the rate and changes nothing
+/// else, [`evolve`](Self::evolve) first lets happen what cannot be undone. Both are one pass over the bonds, which is why
+/// the second is not left to follow the first.
+pub trait Physics: Send {
+    fn unknown(&mut self) -> Unknown<'_>;
+    /// Fills the rate at the values as they are. Nothing breaks.
+    fn evaluate(&mut self);
+    /// Breaks what breaks at the values as they are, then fills the rate. `dt` (s): the step that led there with the
+    /// velocities as they are now, for the books of what broken bonds take; zero where there was none.
+    fn evolve(&mut self, dt: f64);
+    /// A drift and [`evolve`](Self::evolve) in one pass over memory, where that is faster; gives what the drift gives. None,
+    /// with nothing done, where it is not offered.
+    fn drift_and_evolve(&mut self, _drift: &Drift, _dt: f64) -> Option<f64> {
+        None
+    }
+    /// Values of these slots have been set since a drift: component and slots.
+    fn was_set(&mut self, _component: usize, _slots: &[u32]) {}
+    /// A drift has ended, and everything is set.
+    fn has_drifted(&mut self) {}
+    /// Largest stable step, s: of velocity Verlet for equations of second order, of forward Euler for those of first.
+    fn stable_step(&self) -> f64;
+
+    /// The fields that it has, in the order of the lists that users see.
+    fn fields(&self) -> &'static [FieldInfo];
+    /// A field at these points, in point order; None if there is no such field.
+    fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field>;
+    /// The points as they are now.
+    fn points(&self) -> &dyn Points;
+    /// Bonds: which there are, and which hold.
+    fn bonds(&self) -> &dyn Bonds;
+
+    /// Kinetic energy (J), and what is kept where nothing enters: momentum (N·s) or amount, by component.
+    fn motion(&mut self) -> (f64, [f64; 3]);
+    /// The same, where Σ v² over all slots is known already; None where that says nothing.
+    fn motion_of(&self, _squares: f64) -> Option<f64> {
+        None
+    }
+    /// What is in the body beside its motion.
+    fn content(&mut self) -> Content;
+    /// What has broken so far.
+    fn broken(&self) -> Broken {
+        Broken::default()
+    }
+    /// Whether something inside the body takes energy while it moves.
+    fn dissipates(&self) -> bool {
+        false
+    }
+    /// What that takes now, W; None where there is none.
+    fn dissipation(&mut self) -> Option<f64> {
+        None
+    }
+    /// The books as columns of a history.
+    fn columns(&self, balance: &Balance) -> Vec<Column>;
+    /// The first point, in point order, whose value, rate or velocity is not finite: name of the field, value, point.
+    fn first_bad(&mut self) -> Option<(&'static str, f64, usize)>;
+    /// The point that moves or changes fastest.
+    fn fastest(&mut self) -> Option<usize> {
+        None
+    }
+
+    /// What a body at rest is solved by; None where nothing can rest.
+    fn tangent(&mut self) -> Option<&mut dyn Tangent> {
+        None
+    }
+    /// A static solver has brought the body to rest: its displacements (m), the force on each slot and component (N), and
+    /// what broke on the way.
+    fn settle(&mut self, _at_rest: &[f64], _force: &[f64], _broken: Broken) {}
+
+    /// Replaces points where the solution asks for it at time `t`, all levels at once when `thoroughly`; the rate is then that
+    /// of the new points. None where nothing was replaced.
+    fn adapt(&mut self, _t: f64, _thoroughly: bool) -> Option<Replaced> {
+        None
+    }
+    /// How many steps lie between two looks whether points are to be replaced; None where they never are.
+    fn adapts_every(&self) -> Option<u64> {
+        None
+    }
+    /// What replacing points has done; None where they stay.
+    fn adapted(&self) -> Option<Adapted> {
+        None
+    }
+    /// What the hybrid scheme has to do; None in other schemes.
+    fn hybrid(&self) -> Option<elasticity::Work> {
+        None
+    }
+
+    /// Shows everything that changes in a run.
+    fn visit(&mut self, visitor: &mut dyn Visitor);
+    /// Adds the bits that make two states equal: values, velocities, bonds.
+    fn hash(&mut self, hasher: &mut blake3::Hasher);
+    /// Bytes of points, fields, bonds and the scratch of the loops.
+    fn memory(&self) -> usize;
+}
+
+/// A field that a physics has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FieldInfo {
+    pub name: &'static str,
+    /// SI; empty for none.
+    pub unit: &'static str,
+    pub about: &'static str,
+}
+
+/// The points of a body, whatever its dimension.
+pub trait Points {
+    fn dimension(&self) -> usize;
+    fn n_points(&self) -> usize;
+    /// Where the values of each point stand in a component, in point order.
+    fn slots(&self) -> &[u32];
+    fn n_slots(&self) -> usize;
+    /// Reference position of a slot, m; zeros beyond the dimension.
+    fn position(&self, slot: usize) -> [f64; 3];
+    /// m³, m² in 2D, m in 1D.
+    fn volume(&self, slot: usize) -> f64;
+    /// Of all points, if it is the same.
+    fn same_volume(&self) -> Option<f64>;
+    /// m
+    fn spacing(&self) -> f64;
+    /// m
+    fn horizon(&self) -> f64;
+    /// How often the points have been replaced.
+    fn generation(&self) -> u64;
+}
+
+/// The bonds of a body.
+pub trait Bonds {
+    /// Directed bonds before any broke, and how many pre-cracks cut.
+    fn count(&self) -> [u64; 2];
+    /// Bonds of each point that hold, in point order.
+    fn per_point(&self) -> Vec<u32>;
+    /// One bit for each, set while it holds.
+    fn words(&self) -> &[u16];
+    /// x and x′ (m) of the bond whose state is bit `bit % 16` of word `bit / 16`.
+    fn ends(&self, bit: usize) -> [[f64; 3]; 2];
+}
+
+/// What is in a body beside its motion.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Content {
+    /// Strain energy, J.
+    pub stored: f64,
+    /// Σ ρ |v| V (N·s), or Σ |amount|: what a defect of what is kept is measured against.
+    pub scale: f64,
+    /// About the origin, N·m·s.
+    pub angular_momentum: [f64; 3],
+}
+
+/// Points were replaced.
+pub struct Replaced {
+    /// One after another.
+    pub remaps: Vec<Remap>,
+    /// By how much the kinetic and strain energy changed, J.
+    pub energy: f64,
+}
+
+/// What replacing points has done so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Adapted {
+    /// Times that the criteria were asked, and that points were replaced.
+    pub looks: u64,
+    pub events: u64,
+    /// Σ |change of the energy| by that, J.
+    pub energy: f64,
+    /// Directed bonds of families that were found anew, and of all families, over all events.
+    pub bonds: [u64; 2],
+    /// Points that saw, with a horizon larger than theirs, one for which finer cells were asked: largest of all events.
+    pub seen: usize,
+    /// The most points at any time, and Σ of the points over all looks and the start.
+    pub points: [u64; 2],
+}
+
+/// A number of the books.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    pub name: String,
+    pub value: f64,
+}
+
+impl Column {
+    pub fn new(name: impl Into<String>, value: f64) -> Self {
+        Column { name: name.into(), value }
+    }
+}
+
+/// The energies (J; J/m of thickness in 2D, J of a unit cross-section in 1D) and momenta of a body at one instant; of what
+/// diffuses, the amount stands for the momentum.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Balance {
+    pub kinetic: f64,
+    pub strain: f64,
+    /// Energy that broken bonds took with them.
+    pub fracture: f64,
+    /// Work of loads and prescribed motion.
+    pub external: f64,
+    /// Energy taken by damping.
+    pub damped: f64,
+    /// Energy that came in when points were split and merged.
+    pub refined: f64,
+    /// Kinetic and strain energy at the start.
+    pub initial: f64,
+    /// N·s
+    pub momentum: [f64; 3],
+    /// What came in from outside, N·s.
+    pub impulse: [f64; 3],
+    /// About the origin, N·m·s.
+    pub angular_momentum: [f64; 3],
+    /// |momentum − initial momentum − impulse from outside|, N·s.
+    pub momentum_defect: f64,
+    /// Σ ρ |v| V: what the momentum defect is measured against, N·s.
+    pub momentum_scale: f64,
+}
+
+impl Balance {
+    /// What is found less what should be there, J.
+    pub fn defect(&self) -> f64 {
+        self.kinetic + self.strain + self.fracture + self.damped - self.initial - self.external - self.refined
+    }
+
+    /// What a defect is measured against: the larger of the initial energy and the external work, J.
+    pub fn scale(&self) -> f64 {
+        self.initial.max(self.external.abs())
+    }
+}
+
+/// A body at rest, as static solvers see it: in double precision whatever the fields are stored in. Unknowns are the
+/// displacements by slot, component after component; forces are those on a point, N.
+pub trait Tangent {
+    fn components(&self) -> usize;
+    fn points(&self) -> &dyn Points;
+    /// Displacements now, m.
+    fn displacement(&mut self) -> Vec<f64>;
+    /// Internal forces at displacements `u`, force density times volume.
+    fn forces(&mut self, u: &[f64], force: &mut [f64]);
+    /// Whether forces are linear in displacements.
+    fn is_linear(&self) -> bool;
+    /// The diagonal of −∂force density/∂u at rest, by unknown, N/m⁴ in 3D; zero where there are no bonds.
+    fn diagonal(&mut self) -> Vec<f64>;
+    /// What the blocks of the points on the diagonal are as a preconditioner; rows and columns that are not free are those of
+    /// one.
+    fn block_diagonal(&mut self, free: &dyn Fn(usize) -> bool) -> Result<Box<dyn Preconditioner>, LinearError>;
+    /// −∂force/∂u at displacements `u`, N/m; rows and columns that are not free are those of one.
+    ///
+    /// # Panics
+    /// Where a material has no tangent by bonds: cases that ask for it are refused.
+    fn assemble(&mut self, u: &[f64], free: &dyn Fn(usize) -> bool) -> Sparse;
+    /// Whether bonds can break.
+    fn can_break(&self) -> bool;
+    /// The largest strain of a bond over its critical strain at displacements `u`; 0 where all are below it.
+    fn worst(&mut self, u: &[f64]) -> f64;
+    /// Breaks the bonds that are strained beyond `limit` times their critical strain.
+    fn break_beyond(&mut self, u: &[f64], limit: f64) -> Broken;
+    /// The bits of the bonds, to be kept and put back when a step fails.
+    fn words(&self) -> &[u16];
+    fn words_mut(&mut self) -> &mut [u16];
+}

@@ -3,29 +3,24 @@
 //! Always in double precision, whatever the fields are stored in. Unknowns are the displacements by slot, component
 //! after component; forces are those on a point, N: force density times volume.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use super::Problem;
-use crate::conditions::{Load, Prescribed, Quantity};
+use crate::conditions::{Constraint, Term};
 use crate::error::{Error, NumericalStop, Result};
-use crate::execution::{BreakRule, Broken, Exec, Packs};
-use crate::family::{Body, Bond, BondLaw, BondStates};
-use crate::field::{Double, Number, components, components_mut};
-use crate::physics::elasticity::Elasticity;
-use crate::physics::failure::CriticalStretch;
+use crate::execution::Broken;
+use crate::physics::Tangent;
 use crate::solver::Clock;
-use crate::solver::linear::{BlockJacobi, Layout, LinearError, NullSpace, Preconditioner, Sparse, vector};
+use crate::solver::linear::{LinearError, NullSpace, Preconditioner, Sparse, vector};
 use crate::solver::newton::{Equilibrium, Unrest};
 use crate::solver::statics::{LoadStep, Statics};
 
 /// A body that a static solver brings to rest.
-struct Rest<'a, const D: usize, L> {
-    body: &'a Body<D>,
-    physics: &'a Elasticity<L>,
-    states: &'a mut BondStates,
-    prescribed: &'a mut [Prescribed],
-    loads: &'a mut [Load],
-    exec: &'a mut Exec,
+struct Rest<'a> {
+    body: &'a mut dyn Tangent,
+    constraints: &'a mut [Box<dyn Constraint>],
+    terms: &'a mut [Box<dyn Term>],
+    /// Slots.
+    n: usize,
+    components: usize,
     /// Whether forces are those of the tangent at u = 0.
     linearised: bool,
     displacement: Vec<f64>,
@@ -70,30 +65,22 @@ const DEPENDENT: f64 = 1e-9;
 /// The step of a difference quotient, in spacings: bonds are strained by 1e-5, so that the curvature of the law is seen
 /// to 1e-10, and rounding to 1e-11.
 const DIFFERENCE: f64 = 1e-5;
-/// What preconditioning by blocks keeps of their off-diagonals: the block of a point whose bonds are all in one plane or on
-/// one line is singular, and so is not.
-const COUPLED: f64 = 0.999;
 
-impl<'a, const D: usize, L: BondLaw<D>> Rest<'a, D, L> {
-    #[allow(clippy::too_many_arguments)] // the parts of a problem that it borrows
-    pub fn new(
-        body: &'a Body<D>,
-        physics: &'a Elasticity<L>,
-        states: &'a mut BondStates,
-        prescribed: &'a mut [Prescribed],
-        loads: &'a mut [Load],
-        exec: &'a mut Exec,
-        displacement: Vec<f64>,
+impl<'a> Rest<'a> {
+    fn new(
+        body: &'a mut dyn Tangent,
+        constraints: &'a mut [Box<dyn Constraint>],
+        terms: &'a mut [Box<dyn Term>],
         linearised: bool,
     ) -> Self {
+        let (displacement, components, slots) = (body.displacement(), body.components(), body.points().n_slots());
         let n = displacement.len();
         Rest {
             body,
-            physics,
-            states,
-            prescribed,
-            loads,
-            exec,
+            constraints,
+            terms,
+            n: slots,
+            components,
             linearised,
             displacement,
             load: vec![0.0; n],
@@ -105,44 +92,25 @@ impl<'a, const D: usize, L: BondLaw<D>> Rest<'a, D, L> {
 
     /// What a failed step changes.
     fn saved(&self) -> (Vec<f64>, Vec<u16>, f64) {
-        (self.displacement.clone(), self.states.words().to_vec(), self.time)
+        (self.displacement.clone(), self.body.words().to_vec(), self.time)
     }
 
     fn restore(&mut self, (displacement, words, time): (Vec<f64>, Vec<u16>, f64)) {
         self.displacement = displacement;
-        self.states.words_mut().copy_from_slice(&words);
+        self.body.words_mut().copy_from_slice(&words);
         self.time = time;
-    }
-
-    /// Force density × volume → force, by slot.
-    fn times_volume(&self, force: &mut [f64]) {
-        let cloud = &self.body.cloud;
-        for component in components_mut::<D, _>(force) {
-            vector::fill(component, |start, values| {
-                for (k, value) in values.iter_mut().enumerate() {
-                    *value *= cloud.volume(start + k);
-                }
-            });
-        }
-    }
-
-    /// Internal force of the law at displacements `u`, N.
-    fn forces(&mut self, u: &[f64], force: &mut [f64]) {
-        let (input, output) = (components::<D, _>(u), components_mut::<D, _>(&mut *force));
-        self.physics.force_density::<D, Double>(self.body, self.exec, self.states, input, output);
-        self.times_volume(force);
     }
 
     /// Change of the internal force by displacements `x` from those now, or from zero, to first order, N.
     fn change(&mut self, x: &[f64], change: &mut [f64]) {
-        if L::LINEAR {
-            return self.forces(x, change);
+        if self.body.is_linear() {
+            return self.body.forces(x, change);
         }
         let largest = x.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
         if largest == 0.0 {
             return change.fill(0.0);
         }
-        let h = DIFFERENCE * self.body.cloud.spacing / largest;
+        let h = DIFFERENCE * self.body.points().spacing() / largest;
         let [mut u, mut before] = std::mem::take(&mut self.scratch);
         for (sign, force) in [(1.0, &mut *change), (-1.0, &mut before)] {
             if self.linearised {
@@ -151,7 +119,7 @@ impl<'a, const D: usize, L: BondLaw<D>> Rest<'a, D, L> {
                 u.copy_from_slice(&self.displacement);
             }
             vector::add(sign * h, x, &mut u);
-            self.forces(&u, force);
+            self.body.forces(&u, force);
         }
         vector::add(-1.0, &before, change);
         vector::scale(0.5 / h, change);
@@ -164,30 +132,33 @@ impl<'a, const D: usize, L: BondLaw<D>> Rest<'a, D, L> {
         if self.linearised {
             self.change(&u, force)
         } else {
-            self.forces(&u, force)
+            self.body.forces(&u, force)
         }
         self.displacement = u;
     }
 
     /// Which unknowns are free at time `t`.
     fn classify(&mut self, t: f64) {
-        let n = self.body.cloud.n_slots();
-        let mut springs = vec![0.0; D * n];
-        self.physics.diagonal(self.body, self.exec, self.states, components_mut::<D, _>(&mut springs));
+        let (n, springs) = (self.n, self.body.diagonal());
         self.kind.fill(Kind::Absent);
-        for &slot in &self.body.cloud.slots {
-            for d in 0..D {
+        for &slot in self.body.points().slots() {
+            for d in 0..self.components {
                 let k = d * n + slot as usize;
                 if springs[k] > 0.0 || self.load[k] != 0.0 {
                     self.kind[k] = Kind::Free;
                 }
             }
         }
-        for p in self.prescribed.iter().filter(|p| p.holds(t)) {
-            for &slot in p.slots.iter() {
-                self.kind[p.component * n + slot as usize] = Kind::Held;
+        for constraint in self.constraints.iter().filter(|constraint| constraint.holds(t)) {
+            let (component, slots) = constraint.on();
+            for &slot in slots {
+                self.kind[component * n + slot as usize] = Kind::Held;
             }
         }
+    }
+
+    fn is_free(kind: &[Kind]) -> impl Fn(usize) -> bool {
+        move |k| kind[k] == Kind::Free
     }
 
     /// Zeroes what is not free.
@@ -231,35 +202,16 @@ impl<'a, const D: usize, L: BondLaw<D>> Rest<'a, D, L> {
 
     /// Sets the reactions of prescribed sets: what holds them against the forces of `state`, N.
     pub fn react(&mut self, state: &Resting) {
-        let n = self.body.cloud.n_slots();
-        for p in self.prescribed.iter_mut() {
-            p.reaction = -p.slots.iter().map(|&slot| state.total[p.component * n + slot as usize]).sum::<f64>();
+        let n = self.n;
+        for constraint in self.constraints.iter_mut() {
+            let (component, slots) = constraint.on();
+            let reaction = -slots.iter().map(|&slot| state.total[component * n + slot as usize]).sum::<f64>();
+            constraint.react(reaction);
         }
-    }
-
-    /// The largest strain of a bond over its critical strain; 0 where all are below it.
-    fn worst(&mut self, failure: &CriticalStretch) -> f64 {
-        let largest = AtomicU64::new(0);
-        self.break_where(failure, f64::INFINITY, &largest);
-        f64::from_bits(largest.into_inner())
-    }
-
-    /// Breaks the bonds that are strained beyond `limit` times their critical strain.
-    fn break_beyond(&mut self, failure: &CriticalStretch, limit: f64) -> Broken {
-        self.break_where(failure, limit, &AtomicU64::new(0))
-    }
-
-    fn break_where(&mut self, failure: &CriticalStretch, limit: f64, largest: &AtomicU64) -> Broken {
-        let mut force = std::mem::take(&mut self.scratch[0]);
-        let (input, output) = (components::<D, _>(&self.displacement), components_mut::<D, _>(&mut force));
-        let rule = Overstrained { failure, law: self.physics.law, displacement: input, limit, largest };
-        let broken = self.physics.break_by::<D, Double>(self.body, self.exec, self.states, input, output, &rule);
-        self.scratch[0] = force;
-        broken
     }
 }
 
-impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
+impl Problem {
     /// Takes a load step: brings the body to rest at its end, by smaller steps where that fails.
     ///
     /// `observe` as in [`Statics::solve`]; when it answers false, the state stays the last one at rest, and this gives
@@ -276,11 +228,10 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         let (start, began) = (clock.time(), *clock);
         clock.step += 1;
         let end = clock.time();
-        let displacement = self.state.displacement.iter().map(|u| u.to_f64()).collect();
-        let Problem { body, physics, state, prescribed, loads, exec, .. } = self;
-        let failure = physics.failure.as_ref().filter(|_| statics.breaking);
-        let mut rest =
-            Rest::new(body, physics, &mut state.states, prescribed, loads, exec, displacement, statics.linearised);
+        let Problem { physics, constraints, terms, .. } = self;
+        let body = physics.tangent().expect("checks have refused static solvers of what cannot rest");
+        let mut rest = Rest::new(body, constraints, terms, statics.linearised);
+        let breaking = statics.breaking && rest.body.can_break();
         rest.time = start;
         rest.pose(start);
         let (mut books, mut step, mut failed) = (Books::new(&mut rest), end - start, None);
@@ -289,7 +240,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
             let next = if rest.time + 1.001 * step < end { rest.time + step } else { end };
             let (saved, before) = (rest.saved(), books.clone());
             let divisible = 0.5 * (next - rest.time) >= SMALLEST_STEP * (end - start);
-            match books.advance(&mut rest, statics, failure, next, divisible, &mut log, observe) {
+            match books.advance(&mut rest, statics, breaking, next, divisible, &mut log, observe) {
                 Ok(true) => step *= 2.0,
                 Err(unrest) if !divisible || unrest.stays() => {
                     rest.restore(saved);
@@ -308,20 +259,9 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Problem<D, L, P> {
         let reached = rest.time;
         rest.react(&books.state);
         let Books { state: at_rest, work, broken } = books;
-        self.state.broken.bonds += broken.bonds;
-        self.state.broken.energy += broken.energy;
+        self.physics.settle(&at_rest.displacement, &at_rest.total, broken);
         self.ledger.external += work.external;
         self.ledger.damped += work.lost;
-        for (u, value) in self.state.displacement.iter_mut().zip(&at_rest.displacement) {
-            *u = P::Field::from_f64(*value);
-        }
-        let cloud = &self.body.cloud;
-        let forces = components_mut::<D, _>(&mut self.state.force).into_iter().zip(components::<D, _>(&at_rest.total));
-        for (force, total) in forces {
-            for &slot in &cloud.slots {
-                force[slot as usize] = P::Field::from_f64(total[slot as usize] / cloud.volume(slot as usize));
-            }
-        }
         log.time = reached;
         let halvings = log.halvings;
         self.load_steps.push(log);
@@ -363,18 +303,18 @@ struct Books {
 }
 
 impl Books {
-    fn new<const D: usize, L: BondLaw<D>>(rest: &mut Rest<'_, D, L>) -> Self {
+    fn new(rest: &mut Rest<'_>) -> Self {
         Books { state: rest.resting(), work: Work::default(), broken: Broken::default() }
     }
 
     /// Brings the body to rest at time `t`, bonds broken until none is overstrained. False when the step is
     /// `divisible`, and went so far that bonds are strained well beyond where they should have broken.
     #[allow(clippy::too_many_arguments)] // a step, how it is taken, and who is told of it
-    fn advance<const D: usize, L: BondLaw<D>>(
+    fn advance(
         &mut self,
-        rest: &mut Rest<'_, D, L>,
+        rest: &mut Rest<'_>,
         statics: &Statics,
-        failure: Option<&CriticalStretch>,
+        breaking: bool,
         t: f64,
         divisible: bool,
         log: &mut LoadStep,
@@ -389,8 +329,10 @@ impl Books {
             self.state = state;
             self.work.external += work.external;
             self.work.lost += work.lost;
-            let Some(failure) = failure else { return Ok(true) };
-            let worst = rest.worst(failure);
+            if !breaking {
+                return Ok(true);
+            }
+            let worst = rest.body.worst(&rest.displacement);
             if worst <= 1.0 {
                 return Ok(true);
             }
@@ -398,7 +340,7 @@ impl Books {
                 return Ok(false);
             }
             first = false;
-            let broken = rest.break_beyond(failure, 1.0 + WORST * (worst - 1.0));
+            let broken = rest.body.break_beyond(&rest.displacement, 1.0 + WORST * (worst - 1.0));
             self.broken.bonds += broken.bonds;
             self.broken.energy += broken.energy;
             self.state = rest.resting();
@@ -406,35 +348,7 @@ impl Books {
     }
 }
 
-/// Bonds whose strain passes `limit` times the critical one.
-struct Overstrained<'a, const D: usize, L> {
-    failure: &'a CriticalStretch,
-    law: L,
-    displacement: [&'a [f64]; D],
-    limit: f64,
-    /// Bits of the largest strain over the critical one: those of positive numbers ascend with them.
-    largest: &'a AtomicU64,
-}
-
-impl<const D: usize, L: BondLaw<D>> BreakRule<D> for Overstrained<'_, D, L> {
-    fn threshold(&self) -> f64 {
-        self.law.strain_at(self.failure.smallest())
-    }
-
-    fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
-        let ratio = strain / self.law.strain_at(self.failure.of(here, there));
-        self.largest.fetch_max(ratio.to_bits(), Ordering::Relaxed);
-        ratio > self.limit
-    }
-
-    /// Half of what the bond holds.
-    fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
-        let eta = std::array::from_fn(|d| self.displacement[d][there] - self.displacement[d][here]);
-        0.5 * self.law.energy(bond, self.law.strain(bond, &eta))
-    }
-}
-
-impl<const D: usize, L: BondLaw<D>> Equilibrium for Rest<'_, D, L> {
+impl Equilibrium for Rest<'_> {
     fn size(&self) -> usize {
         self.displacement.len()
     }
@@ -444,27 +358,14 @@ impl<const D: usize, L: BondLaw<D>> Equilibrium for Rest<'_, D, L> {
     }
 
     fn pose(&mut self, t: f64) -> Vec<f64> {
-        let n = self.body.cloud.n_slots();
         self.load.fill(0.0);
-        for load in self.loads.iter_mut() {
-            let component = &mut self.load[load.component * n..][..n];
-            load.each(t, |slot, b| component[slot] += b);
+        for term in self.terms.iter_mut() {
+            term.force(t, &mut self.load, self.n);
         }
-        let mut load = std::mem::take(&mut self.load);
-        self.times_volume(&mut load);
-        self.load = load;
         self.classify(t);
         let mut way = vec![0.0; self.displacement.len()];
-        for p in self.prescribed.iter_mut().filter(|p| p.holds(t)) {
-            // A velocity is the rate of a displacement, whatever time stands for.
-            let (at, step) = match p.quantity {
-                Quantity::Displacement => (t, None),
-                Quantity::Velocity => (0.5 * (self.time + t), Some(t - self.time)),
-            };
-            for (&slot, value) in p.slots.iter().zip(p.profile.at(at)) {
-                let k = p.component * n + slot as usize;
-                way[k] = step.map_or(value - self.displacement[k], |step| step * value);
-            }
+        for constraint in self.constraints.iter_mut().filter(|constraint| constraint.holds(t)) {
+            constraint.way([self.time, t], &self.displacement, &mut way, self.n);
         }
         way
     }
@@ -489,10 +390,10 @@ impl<const D: usize, L: BondLaw<D>> Equilibrium for Rest<'_, D, L> {
     }
 
     fn diagonal(&mut self) -> Vec<f64> {
-        let mut diagonal = vec![0.0; self.displacement.len()];
-        self.physics.diagonal(self.body, self.exec, self.states, components_mut::<D, _>(&mut diagonal));
-        self.times_volume(&mut diagonal);
-        for (value, kind) in diagonal.iter_mut().zip(&self.kind) {
+        let mut diagonal = self.body.diagonal();
+        let (points, n) = (self.body.points(), self.n);
+        for (k, (value, kind)) in diagonal.iter_mut().zip(&self.kind).enumerate() {
+            *value *= points.volume(k % n);
             if *kind != Kind::Free || *value <= 0.0 {
                 *value = 1.0;
             }
@@ -501,68 +402,28 @@ impl<const D: usize, L: BondLaw<D>> Equilibrium for Rest<'_, D, L> {
     }
 
     fn block_diagonal(&mut self) -> Result<Box<dyn Preconditioner>, LinearError> {
-        let n = self.body.cloud.n_slots();
-        let rows: [Vec<f64>; D] = std::array::from_fn(|row| {
-            let mut sums = vec![0.0; D * n];
-            let parts = components_mut::<D, _>(&mut sums);
-            self.physics.diagonal_row(row, self.body, self.exec, self.states, parts);
-            sums
-        });
-        let entry = |slot: usize, c: usize, d: usize| {
-            let [here, there] = [c, d].map(|c| self.kind[c * n + slot] == Kind::Free && rows[c][c * n + slot] > 0.0);
-            match (here && there, c == d) {
-                (true, true) => rows[c][c * n + slot] * self.body.cloud.volume(slot),
-                (true, false) => COUPLED * rows[c][d * n + slot] * self.body.cloud.volume(slot),
-                (false, same) => f64::from(u8::from(same)),
-            }
-        };
-        let block = |slot| std::array::from_fn(|c| std::array::from_fn(|d| entry(slot, c, d)));
-        let blocks: Vec<[[f64; D]; D]> = (0..n).map(block).collect();
-        Ok(Box::new(BlockJacobi::new(&blocks, Layout::ByComponent)?))
+        self.body.block_diagonal(&Self::is_free(&self.kind))
     }
 
     fn assemble(&mut self) -> Sparse {
-        let (cloud, n) = (&self.body.cloud, self.body.cloud.n_slots());
-        let rest = vec![0.0; if self.linearised { D * n } else { 0 }];
+        let rest = vec![0.0; if self.linearised { self.displacement.len() } else { 0 }];
         let u = if self.linearised { &rest } else { &self.displacement };
-        let bonds = self.physics.stiffness(self.body, self.states, components::<D, _>(u));
-        let free = |d: usize, slot: usize| self.kind[d * n + slot] == Kind::Free;
-        let (mut starts, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
-        for c in 0..D {
-            for (here, bonds) in bonds.iter().enumerate() {
-                if free(c, here) {
-                    let volume = cloud.volume(here);
-                    for d in 0..D {
-                        // The point itself stands among its neighbours, by its slot.
-                        let own = bonds.iter().map(|(_, block)| block[c][d]).sum::<f64>();
-                        let before = bonds.partition_point(|(there, _)| (*there as usize) < here);
-                        let entry = |(there, block): &(u32, [[f64; D]; D])| (*there as usize, -block[c][d]);
-                        let others = bonds[..before].iter().map(entry);
-                        for (there, value) in others.chain([(here, own)]).chain(bonds[before..].iter().map(entry)) {
-                            if free(d, there) {
-                                columns.push((d * n + there) as u32);
-                                values.push(volume * value);
-                            }
-                        }
-                    }
-                } else {
-                    columns.push((c * n + here) as u32);
-                    values.push(1.0);
-                }
-                starts.push(columns.len() as u64);
-            }
-        }
-        Sparse::from_rows(starts, columns, values)
+        self.body.assemble(u, &Self::is_free(&self.kind))
     }
 
     fn floating(&self) -> NullSpace {
-        let cloud = &self.body.cloud;
-        let (low, high) = cloud.bounds();
-        let centre: [f64; D] = std::array::from_fn(|d| 0.5 * (low[d] + high[d]));
-        let size = (0..D).map(|d| high[d] - low[d]).fold(cloud.spacing, f64::max);
-        let planes: Vec<[usize; 2]> = (0..D).flat_map(|a| (a + 1..D).map(move |b| [a, b])).collect();
+        let (points, n, axes) = (self.body.points(), self.n, self.components);
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for &slot in points.slots() {
+            for (d, x) in points.position(slot as usize).into_iter().enumerate() {
+                (low[d], high[d]) = (low[d].min(x), high[d].max(x));
+            }
+        }
+        let centre: [f64; 3] = std::array::from_fn(|d| 0.5 * (low[d] + high[d]));
+        let size = (0..axes).map(|d| high[d] - low[d]).fold(points.spacing(), f64::max);
+        let planes: Vec<[usize; 2]> = (0..axes).flat_map(|a| (a + 1..axes).map(move |b| [a, b])).collect();
         // Component d of motion m at x: a translation, or a rotation in a plane of two axes.
-        let motion = |m: usize, d: usize, x: &[f64; D]| match m.checked_sub(D) {
+        let motion = |m: usize, d: usize, x: &[f64; 3]| match m.checked_sub(axes) {
             None => f64::from(u8::from(m == d)),
             Some(plane) => {
                 let [a, b] = planes[plane];
@@ -576,15 +437,14 @@ impl<const D: usize, L: BondLaw<D>> Equilibrium for Rest<'_, D, L> {
                 }
             }
         };
-        let n = cloud.n_slots();
         let mut held = Vec::new();
-        for d in 0..D {
-            let of_axis = |kind: Kind| cloud.slots.iter().filter(move |&&s| self.kind[d * n + s as usize] == kind);
-            held.extend(of_axis(Kind::Held).map(|&slot| (d, cloud.position(slot as usize))));
+        for d in 0..axes {
+            let of_axis = |kind: Kind| points.slots().iter().filter(move |&&s| self.kind[d * n + s as usize] == kind);
+            held.extend(of_axis(Kind::Held).map(|&slot| (d, points.position(slot as usize))));
         }
         // The combinations of motions that leave every held unknown where it is: motions are made independent on the
         // held unknowns, one after the other; what is left of one that depends on those before it is such a combination.
-        let count = D + planes.len();
+        let count = axes + planes.len();
         let mut independent: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
         let mut free = Vec::new();
         for m in 0..count {
@@ -610,9 +470,9 @@ impl<const D: usize, L: BondLaw<D>> Equilibrium for Rest<'_, D, L> {
         }
         let field = |weights: Vec<f64>| {
             let mut field = vec![0.0; self.displacement.len()];
-            for &slot in &cloud.slots {
-                let x = cloud.position(slot as usize);
-                for d in 0..D {
+            for &slot in points.slots() {
+                let x = points.position(slot as usize);
+                for d in 0..axes {
                     let k = d * n + slot as usize;
                     if self.kind[k] == Kind::Free {
                         field[k] = (0..count).map(|m| weights[m] * motion(m, d, &x)).sum();
@@ -625,7 +485,7 @@ impl<const D: usize, L: BondLaw<D>> Equilibrium for Rest<'_, D, L> {
     }
 
     fn is_linear(&self) -> bool {
-        L::LINEAR || self.linearised
+        self.body.is_linear() || self.linearised
     }
 }
 
@@ -633,8 +493,11 @@ impl<const D: usize, L: BondLaw<D>> Equilibrium for Rest<'_, D, L> {
 mod tests {
     use super::*;
     use crate::discretization::{Influence, Operator, PartialVolume, standard};
+    use crate::family::BondLaw;
+    use crate::field::Double;
     use crate::geometry::{Arrangement, Cloud, Crack, Shape};
-    use crate::physics::elasticity::bond_based::{BondBased, BondBasedLinear};
+    use crate::physics::elasticity::laws::{BondBased, BondBasedLinear};
+    use crate::physics::elasticity::{Bonds, Elasticity};
     use crate::solver::linear::LinearOperator;
 
     /// Random displacements of a fiftieth of a spacing on a cracked body with held unknowns; the share by which the products
@@ -651,16 +514,14 @@ mod tests {
         }
         let body = standard::body(cloud, 2.6, rule);
         let operator = Operator::standard(&body, 1.0, Influence::Linear, rule);
-        let physics = Elasticity { law, density: 1.0, operator, failure: None, state_based: None };
-        let mut states = BondStates::whole(&body);
+        let mut body = Elasticity::<D, Double>::new(body, operator, Box::new(Bonds(law)), 1.0, None);
         if let Some(crack) = (D == 2).then(|| Crack::Polyline(vec![[0.0, 5.2], [9.1, 5.2]])) {
-            assert!(states.cut(&body, &crack, 1e-9) > 0);
+            assert!(body.cut(&crack, 1e-9) > 0);
         }
-        let n = D * body.cloud.n_slots();
-        assert!(matches!(body.cloud.arrangement, Arrangement::Lattice(_)) != scattered);
-        let u = (0..n).map(|k| 0.02 * vector::scattered(k)).collect();
-        let mut exec = Exec::default();
-        let mut rest = Rest::new(&body, &physics, &mut states, &mut [], &mut [], &mut exec, u, false);
+        let n = D * body.body.cloud.n_slots();
+        assert!(matches!(body.body.cloud.arrangement, Arrangement::Lattice(_)) != scattered);
+        body.state.displacement = (0..n).map(|k| 0.02 * vector::scattered(k)).collect();
+        let mut rest = Rest::new(&mut body, &mut [], &mut [], false);
         rest.pose(0.0);
         for k in (0..n).step_by(7) {
             if rest.kind[k] == Kind::Free {

@@ -5,47 +5,42 @@
 
 use rayon::prelude::*;
 
-use super::Clock;
 use super::velocity_verlet::CHUNK;
+use super::{Clock, Stage, System};
 use crate::field::Number;
+use crate::unknown::with;
 
-/// What solvers of first order advance: u̇ = rate(u, t).
-pub trait Rated {
-    /// What the vectors are stored in.
-    type Number: Number;
-    /// Fills the rates of change at time `t` (s).
-    fn evaluate(&mut self, t: f64);
-    /// The unknowns, and their rates of change (1/s of them) as last filled.
-    fn unknowns(&mut self) -> (&mut [Self::Number], &[Self::Number]);
-    /// Imposes the prescribed values of time `t` (s).
-    fn constrain(&mut self, t: f64);
-    /// Largest stable step, s.
-    fn stable_step(&self) -> f64;
-}
-
-/// The explicit Euler method.
+/// The explicit Euler method, of equations of first order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ForwardEuler;
 
 impl ForwardEuler {
-    /// Advances `system` by one step.
-    pub fn step<S: Rated>(self, system: &mut S, clock: &mut Clock) {
-        system.evaluate(clock.time());
-        let dt = S::Number::from_f64(clock.dt);
-        let (unknowns, rates) = system.unknowns();
-        unknowns.par_chunks_mut(CHUNK).zip(rates.par_chunks(CHUNK)).for_each(|(u, rate)| {
-            for (u, rate) in u.iter_mut().zip(rate) {
-                *u = *u + dt * *rate;
-            }
-        });
+    /// Advances `system`, whose rates are those of its values as they are, by one step.
+    pub fn step<S: System>(self, system: &mut S, clock: &mut Clock) {
+        let (t, dt) = (clock.time(), clock.dt);
+        let mut unknown = system.unknown();
+        let by = dt / unknown.inertia;
+        with!(unknown, vectors => go(vectors.value, vectors.rate, by));
         clock.step += 1;
-        system.constrain(clock.time());
+        system.constrain(Stage::Drift, t, dt);
+        system.evolve(clock.time(), dt);
     }
+}
+
+/// u + Δt Ċ
+fn go<T: Number>(value: &mut [T], rate: &[T], by: f64) {
+    let by = T::from_f64(by);
+    value.par_chunks_mut(CHUNK).zip(rate.par_chunks(CHUNK)).for_each(|(u, rate)| {
+        for (u, rate) in u.iter_mut().zip(rate) {
+            *u = *u + by * *rate;
+        }
+    });
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::unknown::{Numbers, Unknown, Vectors};
 
     /// u̇ = −3 u + cos t, and a value that is prescribed: t.
     struct Decay {
@@ -53,24 +48,35 @@ mod tests {
         rate: [f64; 2],
     }
 
-    impl Rated for Decay {
-        type Number = f64;
-        fn evaluate(&mut self, t: f64) {
+    impl System for Decay {
+        fn unknown(&mut self) -> Unknown<'_> {
+            let (value, rate) = (&mut self.u[..], &mut self.rate[..]);
+            Unknown {
+                vectors: Numbers::Double(Vectors { value, velocity: &mut [], rate, damped: None }),
+                components: 1,
+                inertia: 1.0,
+                negligible: 0.0,
+            }
+        }
+        fn constrain(&mut self, _: Stage, t: f64, dt: f64) {
+            self.u[1] = t + dt;
+        }
+        fn evolve(&mut self, t: f64, _: f64) {
             self.rate = [t.cos() - 3.0 * self.u[0], 99.0];
-        }
-        fn unknowns(&mut self) -> (&mut [f64], &[f64]) {
-            (&mut self.u, &self.rate)
-        }
-        fn constrain(&mut self, t: f64) {
-            self.u[1] = t;
         }
         fn stable_step(&self) -> f64 {
             2.0 / 3.0
         }
     }
 
-    fn at_one(steps: u64) -> [f64; 2] {
+    fn decay() -> Decay {
         let mut system = Decay { u: [1.0, 0.0], rate: [0.0; 2] };
+        system.evolve(0.0, 0.0);
+        system
+    }
+
+    fn at_one(steps: u64) -> [f64; 2] {
+        let mut system = decay();
         let mut clock = Clock::new(1.0 / steps as f64);
         (0..steps).for_each(|_| ForwardEuler.step(&mut system, &mut clock));
         system.u
@@ -90,7 +96,7 @@ mod tests {
     #[test]
     fn a_step_beyond_the_stable_one_grows() {
         let after = |dt: f64| {
-            let mut system = Decay { u: [1.0, 0.0], rate: [0.0; 2] };
+            let mut system = decay();
             let mut clock = Clock::new(dt);
             (0..400).for_each(|_| ForwardEuler.step(&mut system, &mut clock));
             system.u[0].abs()

@@ -14,13 +14,16 @@ pub use runge_kutta::RungeKutta;
 pub use statics::Statics;
 pub use velocity_verlet::{Drift, VelocityVerlet};
 
-use crate::field::Number;
+use crate::conditions::Stage;
+use crate::unknown::Unknown;
 
 /// How a problem is advanced by a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Solver {
     VelocityVerlet(VelocityVerlet),
     RungeKutta(RungeKutta),
+    /// Of equations of first order.
+    ForwardEuler(ForwardEuler),
     /// A step is a load step, and time only what conditions are given in.
     Statics(Statics),
 }
@@ -31,28 +34,13 @@ impl Solver {
         matches!(self, Solver::Statics(_))
     }
 
-    /// Its largest stable step over that of velocity Verlet, for which [`System::stable_step`] is estimated.
+    /// Its largest stable step over that for which [`System::stable_step`] is estimated.
     pub fn stability(&self) -> f64 {
         match self {
             Solver::RungeKutta(_) => RungeKutta::STABILITY,
-            Solver::VelocityVerlet(_) | Solver::Statics(_) => 1.0,
+            Solver::VelocityVerlet(_) | Solver::ForwardEuler(_) | Solver::Statics(_) => 1.0,
         }
     }
-}
-
-/// The vectors that a solver of second order advances: ρ ü = force − ρ c u̇.
-pub struct Unknowns<'a, T> {
-    pub displacement: &'a mut [T],
-    pub velocity: &'a mut [T],
-    /// Force density at the current displacements.
-    pub force: &'a [T],
-    /// ρ
-    pub inertia: f64,
-    /// Displacements below this count as zero. Ahead of a wave they fall off without end, and processors are
-    /// slow with numbers near the smallest that they know.
-    pub negligible: f64,
-    /// τ (s) and where u + τ v is wanted after a drift, if it is.
-    pub ahead: Option<(f64, &'a mut [T])>,
 }
 
 /// Where a run stands.
@@ -93,42 +81,32 @@ impl Clock {
     }
 }
 
-/// When constraints are asked to act within a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
-    /// After the drift: set the velocities of the step, and the displacements to which they lead.
-    Drift,
-    /// After the last kick: set the velocities at the end of the step.
-    Finish,
-}
-
 /// What a solver advances.
 pub trait System {
-    /// What the vectors are stored in.
-    type Number: Number;
-    fn unknowns(&mut self) -> Unknowns<'_, Self::Number>;
-    /// Imposes prescribed values; `t` is the time at the start of the step for `Drift`, at its end for `Finish`.
+    fn unknown(&mut self) -> Unknown<'_>;
+    /// Imposes prescribed values; `t` is the time at the start of the step for [`Stage::Drift`], at its end for
+    /// [`Stage::Finish`].
     fn constrain(&mut self, stage: Stage, t: f64, dt: f64);
-    /// Breaks what breaks at the current displacements and fills the force density at time `t`, `dt` after the last.
-    fn evaluate(&mut self, t: f64, dt: f64);
-    /// Largest stable step of velocity Verlet, s.
+    /// Breaks what breaks at the values as they are and fills the rate at time `t`, `dt` after the last.
+    fn evolve(&mut self, t: f64, dt: f64);
+    /// Largest stable step, s: of velocity Verlet for equations of second order, of forward Euler for those of first.
     fn stable_step(&self) -> f64;
-    /// Drifts, and evaluates at time `t`, `dt` later, what has just drifted and is still at hand, and gives what the drift
+    /// Drifts, and evolves at time `t`, `dt` later, what has just drifted and is still at hand, and gives what the drift
     /// gives; None, with nothing done, where the system cannot, or imposes values in between.
-    fn evaluate_behind(&mut self, _drift: &Drift<Self::Number>, _t: f64, _dt: f64) -> Option<f64> {
+    fn drift_and_evolve(&mut self, _drift: &Drift, _t: f64, _dt: f64) -> Option<f64> {
         None
     }
 }
 
 /// What a solver with several stages in a step advances.
 pub trait Staged: System {
-    /// Imposes the prescribed values of time `t`, in a step of `dt` that ends at `end`, and fills the force density there.
+    /// Imposes the prescribed values of time `t`, in a step of `dt` that ends at `end`, and fills the rate there.
     /// Breaks nothing.
     fn stage(&mut self, t: f64, end: f64, dt: f64);
     /// Books what acts now for the given share of a step that ends at `end` and takes `dt`: work and impulse are
     /// advanced by the method of the step.
     fn book(&mut self, share: f64, end: f64, dt: f64);
     /// At the end of a step of `dt`: imposes the prescribed values of time `t`, breaks what breaks there, and fills the
-    /// force density.
+    /// rate.
     fn arrive(&mut self, t: f64, dt: f64);
 }

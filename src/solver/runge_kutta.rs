@@ -13,8 +13,10 @@
 use rayon::prelude::*;
 
 use super::velocity_verlet::{CHUNK, slow, unless_below};
-use super::{Clock, Staged, Unknowns};
+use super::{Clock, Staged};
 use crate::field::Number;
+use crate::unknown::{Numbers, Unknown, Vectors};
+use crate::visit::Visitor;
 
 /// The classical Runge–Kutta method with optional damping proportional to mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,11 +27,47 @@ pub struct RungeKutta {
 
 /// What a step remembers of its stages: four more vectors, kept from step to step.
 #[derive(Debug, Clone, Default)]
-pub struct Memory<T> {
+pub struct Memory {
+    double: Stages<f64>,
+    single: Stages<f32>,
+}
+
+impl Memory {
+    /// Shows what a step remembers while it goes on; every step begins it anew.
+    pub fn visit(&mut self, visitor: &mut dyn Visitor) {
+        let names = ["stage_displacement", "stage_velocity", "stage_displacement_sum", "stage_velocity_sum"];
+        for (name, values) in names.into_iter().zip(self.double.start.iter_mut().chain(&mut self.double.sum)) {
+            visitor.doubles(name, values);
+        }
+        for (name, values) in names.into_iter().zip(self.single.start.iter_mut().chain(&mut self.single.sum)) {
+            visitor.singles(name, values);
+        }
+    }
+}
+
+/// The same in numbers of one kind.
+#[derive(Debug, Clone, Default)]
+struct Stages<T> {
     /// u and v at the start of the step.
     start: [Vec<T>; 2],
     /// k₁ + 2 k₂ + 2 k₃ + k₄ as far as it goes, of u and of v.
     sum: [Vec<T>; 2],
+}
+
+/// Calls a method with the vectors of an unknown and the memory in the same numbers.
+macro_rules! remembering {
+    ($unknown:expr, $memory:expr, |$vectors:ident, $stages:ident| $work:expr) => {
+        match &mut $unknown.vectors {
+            Numbers::Double($vectors) => {
+                let $stages = &mut $memory.double;
+                $work
+            }
+            Numbers::Single($vectors) => {
+                let $stages = &mut $memory.single;
+                $work
+            }
+        }
+    };
 }
 
 /// The share of each stage in the step, and how far ahead of its start the next stage is, in steps.
@@ -42,29 +80,53 @@ impl RungeKutta {
     pub const STABILITY: f64 = std::f64::consts::SQRT_2;
 
     /// Advances `system` by one step.
-    pub fn step<S: Staged>(&self, system: &mut S, clock: &mut Clock, memory: &mut Memory<S::Number>) {
+    pub fn step<S: Staged>(&self, system: &mut S, clock: &mut Clock, memory: &mut Memory) {
         let (t, dt) = (clock.time(), clock.dt);
         clock.step += 1;
         let end = clock.time();
         for (k, [share, ahead]) in STAGES.into_iter().enumerate() {
             system.book(share, end, dt);
-            let unknowns = system.unknowns();
+            let mut unknown = system.unknown();
             if k == 0 {
-                memory.begin(&unknowns);
+                remembering!(unknown, memory, |vectors, stages| stages.begin(vectors));
             }
-            self.stage(unknowns, memory, share, ahead * dt);
+            self.stage(&mut unknown, memory, share, ahead * dt);
             system.stage(t + ahead * dt, end, dt);
         }
         system.book(LAST_SHARE, end, dt);
-        self.finish(system.unknowns(), memory, dt);
+        self.finish(&mut system.unknown(), memory, dt);
         system.arrive(end, dt);
     }
 
     /// Adds the rates of change here to the sum, and goes `ahead` (s) with them from the start of the step.
-    fn stage<T: Number>(&self, unknowns: Unknowns<'_, T>, memory: &mut Memory<T>, share: f64, ahead: f64) {
-        let [factor, drag] = [1.0 / unknowns.inertia, -self.damping].map(T::from_f64);
-        let [share, ahead] = [share, ahead].map(T::from_f64);
-        each(unknowns, memory, |[u, v], f, [u0, v0], [du, dv]| {
+    fn stage(&self, unknown: &mut Unknown<'_>, memory: &mut Memory, share: f64, ahead: f64) {
+        let by = [1.0 / unknown.inertia, -self.damping, share, ahead];
+        remembering!(unknown, memory, |vectors, stages| stages.stage(vectors, by));
+    }
+
+    /// Adds the last stage, and takes the step.
+    fn finish(&self, unknown: &mut Unknown<'_>, memory: &mut Memory, dt: f64) {
+        let by = [1.0 / unknown.inertia, -self.damping, LAST_SHARE, dt];
+        let limits = [unknown.negligible, slow(unknown.negligible, dt)];
+        remembering!(unknown, memory, |vectors, stages| stages.finish(vectors, by, limits));
+    }
+}
+
+impl<T: Number> Stages<T> {
+    fn begin(&mut self, vectors: &Vectors<'_, T>) {
+        for (start, now) in self.start.iter_mut().zip([&*vectors.value, &*vectors.velocity]) {
+            start.resize(now.len(), T::default());
+            start.copy_from_slice(now);
+        }
+        for sum in &mut self.sum {
+            sum.clear();
+            sum.resize(vectors.rate.len(), T::default());
+        }
+    }
+
+    fn stage(&mut self, vectors: &mut Vectors<'_, T>, by: [f64; 4]) {
+        let [factor, drag, share, ahead] = by.map(T::from_f64);
+        each(vectors, self, |[u, v], f, [u0, v0], [du, dv]| {
             let a = factor * f + drag * *v;
             *du = *du + share * *v;
             *dv = *dv + share * a;
@@ -73,12 +135,10 @@ impl RungeKutta {
         });
     }
 
-    /// Adds the last stage, and takes the step.
-    fn finish<T: Number>(&self, unknowns: Unknowns<'_, T>, memory: &mut Memory<T>, dt: f64) {
-        let [factor, drag] = [1.0 / unknowns.inertia, -self.damping].map(T::from_f64);
-        let [still, slow] = [unknowns.negligible, slow(unknowns.negligible, dt)].map(T::from_f64);
-        let [share, dt] = [LAST_SHARE, dt].map(T::from_f64);
-        each(unknowns, memory, |[u, v], f, [u0, v0], [du, dv]| {
+    fn finish(&mut self, vectors: &mut Vectors<'_, T>, by: [f64; 4], limits: [f64; 2]) {
+        let [factor, drag, share, dt] = by.map(T::from_f64);
+        let [still, slow] = limits.map(T::from_f64);
+        each(vectors, self, |[u, v], f, [u0, v0], [du, dv]| {
             let a = factor * f + drag * *v;
             *u = unless_below(still, u0 + dt * (*du + share * *v));
             *v = unless_below(slow, v0 + dt * (*dv + share * a));
@@ -86,28 +146,15 @@ impl RungeKutta {
     }
 }
 
-impl<T: Number> Memory<T> {
-    fn begin(&mut self, unknowns: &Unknowns<'_, T>) {
-        for (start, now) in self.start.iter_mut().zip([&*unknowns.displacement, &*unknowns.velocity]) {
-            start.resize(now.len(), T::default());
-            start.copy_from_slice(now);
-        }
-        for sum in &mut self.sum {
-            sum.clear();
-            sum.resize(unknowns.force.len(), T::default());
-        }
-    }
-}
-
 /// Calls `update` on u and v, the force, u and v at the start and the sums of every unknown.
 fn each<T: Number>(
-    unknowns: Unknowns<'_, T>,
-    memory: &mut Memory<T>,
+    vectors: &mut Vectors<'_, T>,
+    stages: &mut Stages<T>,
     update: impl Fn([&mut T; 2], T, [T; 2], [&mut T; 2]) + Sync,
 ) {
-    let ([u0, v0], [du, dv]) = (&memory.start, &mut memory.sum);
-    let moving = unknowns.displacement.par_chunks_mut(CHUNK).zip(unknowns.velocity.par_chunks_mut(CHUNK));
-    let fixed = unknowns.force.par_chunks(CHUNK).zip(u0.par_chunks(CHUNK)).zip(v0.par_chunks(CHUNK));
+    let ([u0, v0], [du, dv]) = (&stages.start, &mut stages.sum);
+    let moving = vectors.value.par_chunks_mut(CHUNK).zip(vectors.velocity.par_chunks_mut(CHUNK));
+    let fixed = vectors.rate.par_chunks(CHUNK).zip(u0.par_chunks(CHUNK)).zip(v0.par_chunks(CHUNK));
     let sums = du.par_chunks_mut(CHUNK).zip(dv.par_chunks_mut(CHUNK));
     moving.zip(fixed).zip(sums).for_each(|(((u, v), ((f, u0), v0)), (du, dv))| {
         let moving = u.iter_mut().zip(v);
@@ -145,20 +192,17 @@ mod tests {
     }
 
     impl System for Oscillator {
-        type Number = f64;
-        fn unknowns(&mut self) -> Unknowns<'_, f64> {
-            let [u, v, f] = &mut self.state;
-            Unknowns {
-                displacement: std::slice::from_mut(u),
-                velocity: std::slice::from_mut(v),
-                force: std::slice::from_ref(f),
+        fn unknown(&mut self) -> Unknown<'_> {
+            let [u, v, f] = self.state.each_mut().map(std::slice::from_mut);
+            Unknown {
+                vectors: Numbers::Double(Vectors { value: u, velocity: v, rate: f, damped: None }),
+                components: 1,
                 inertia: 1.0,
                 negligible: 0.0,
-                ahead: None,
             }
         }
         fn constrain(&mut self, _: Stage, _: f64, _: f64) {}
-        fn evaluate(&mut self, t: f64, _: f64) {
+        fn evolve(&mut self, t: f64, _: f64) {
             self.force(t);
         }
         fn stable_step(&self) -> f64 {

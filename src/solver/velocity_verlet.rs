@@ -5,9 +5,10 @@
 
 use rayon::prelude::*;
 
-use super::{Clock, Stage, System, Unknowns};
+use super::{Clock, Stage, System};
 use crate::execution::{Sweep, wide};
 use crate::field::Number;
+use crate::unknown::{Unknown, Vectors, with};
 
 /// Numbers that a thread updates at a time.
 pub(super) const CHUNK: usize = 16 * 1024;
@@ -28,87 +29,107 @@ impl VelocityVerlet {
     }
 
     /// The same without its end: a system that prescribes no values may leave its last kick to the next stride, which makes up
-    /// for it in its own pass over memory if it is `owed`, and then gives Σ v² at the end of the step before. The bits are those
+    /// for it in its own pass over memory if one is `pending`, and then gives Σ v² at the end of the step before. The bits are those
     /// of whole steps.
-    pub fn stride<S: System>(&self, system: &mut S, clock: &mut Clock, owed: bool) -> f64 {
-        let drift = Drift::new(self, &system.unknowns(), clock.dt, owed);
+    pub fn stride<S: System>(&self, system: &mut S, clock: &mut Clock, pending: bool) -> f64 {
+        let drift = Drift::new(self, &system.unknown(), clock.dt, pending);
         let (t, dt) = (clock.time(), clock.dt);
         clock.step += 1;
-        if let Some(squares) = system.evaluate_behind(&drift, clock.time(), dt) {
+        if let Some(squares) = system.drift_and_evolve(&drift, clock.time(), dt) {
             return squares;
         }
-        let squares = drift.everywhere(system.unknowns());
+        let squares = drift.everywhere(&mut system.unknown());
         system.constrain(Stage::Drift, t, dt);
-        system.evaluate(clock.time(), dt);
+        system.evolve(clock.time(), dt);
         squares
     }
 
     /// The last kick of a step of `dt` (s). Gives Σ v² after it.
     pub fn finish<S: System>(&self, system: &mut S, dt: f64) -> f64 {
-        let unknowns = system.unknowns();
-        let drift = Drift::new(self, &unknowns, dt, true);
-        let chunks = unknowns.velocity.par_chunks_mut(CHUNK).zip(unknowns.force.par_chunks(CHUNK));
-        let squares = chunks.map(|(velocity, force)| wide(Kick { drift: &drift, velocity, force }));
-        squares.collect::<Vec<f64>>().iter().sum()
+        let mut unknown = system.unknown();
+        let drift = Drift::new(self, &unknown, dt, true);
+        with!(unknown, vectors => {
+            let kick = Kick::new(&drift);
+            let chunks = vectors.velocity.par_chunks_mut(CHUNK).zip(vectors.rate.par_chunks(CHUNK));
+            let squares = chunks.map(|(velocity, force)| wide(Chunk { kick, velocity, force }));
+            squares.collect::<Vec<f64>>().iter().sum()
+        })
     }
 }
 
-/// One pass over the vectors: the last kick of the step before, if it is owed, the first of this step, and the drift.
+/// One pass over the vectors: the last kick of the step before, if it is pending, the first of this step, and the drift.
 #[derive(Debug, Clone, Copy)]
-pub struct Drift<T> {
-    owed: bool,
+pub struct Drift {
+    pending: bool,
     /// What the kicks leave of the velocity, by damping proportional to mass: the first, the last.
-    keep: T,
-    after: T,
+    keep: f64,
+    after: f64,
     /// Δt/2ρ
-    factor: T,
-    dt: T,
+    factor: f64,
+    dt: f64,
     /// τ
-    tau: T,
+    tau: f64,
     /// Below these, displacements and velocities are zero.
-    still: T,
-    slow: T,
+    still: f64,
+    slow: f64,
 }
 
-impl<T: Number> Drift<T> {
-    fn new(method: &VelocityVerlet, unknowns: &Unknowns<'_, T>, dt: f64, owed: bool) -> Self {
+impl Drift {
+    fn new(method: &VelocityVerlet, unknown: &Unknown<'_>, dt: f64, pending: bool) -> Self {
         let half = 0.5 * method.damping * dt;
         Drift {
-            owed,
-            keep: T::from_f64(1.0 - half),
-            after: T::from_f64(1.0 / (1.0 + half)),
-            factor: T::from_f64(0.5 * dt / unknowns.inertia),
-            dt: T::from_f64(dt),
-            tau: T::from_f64(unknowns.ahead.as_ref().map_or(0.0, |(tau, _)| *tau)),
-            still: T::from_f64(unknowns.negligible),
-            slow: T::from_f64(slow(unknowns.negligible, dt)),
+            pending,
+            keep: 1.0 - half,
+            after: 1.0 / (1.0 + half),
+            factor: 0.5 * dt / unknown.inertia,
+            dt,
+            tau: unknown.tau(),
+            still: unknown.negligible,
+            slow: slow(unknown.negligible, dt),
         }
     }
 
-    /// The pass over all numbers. Gives Σ v² after the kick that was owed, and zero if none was.
-    pub fn everywhere(&self, unknowns: Unknowns<'_, T>) -> f64 {
-        let Unknowns { displacement, velocity, force, ahead, .. } = unknowns;
-        let vectors =
-            displacement.par_chunks_mut(CHUNK).zip(velocity.par_chunks_mut(CHUNK)).zip(force.par_chunks(CHUNK));
-        let squares: Vec<f64> = match ahead {
-            Some((_, ahead)) => {
-                let vectors = vectors.zip(ahead.par_chunks_mut(CHUNK));
-                vectors.map(|(((u, v), f), ahead)| self.pass(u, v, f, ahead)).collect()
-            }
-            None => vectors.map(|((u, v), f)| self.pass(u, v, f, &mut [])).collect(),
-        };
-        squares.iter().sum()
+    /// The pass over all numbers. Gives Σ v² after the kick that was pending, and zero if none was.
+    pub fn everywhere(&self, unknown: &mut Unknown<'_>) -> f64 {
+        with!(unknown, vectors => {
+            let Vectors { value, velocity, rate, damped } = vectors;
+            let chunks = value.par_chunks_mut(CHUNK).zip(velocity.par_chunks_mut(CHUNK)).zip(rate.par_chunks(CHUNK));
+            let squares: Vec<f64> = match damped {
+                Some((_, damped)) => {
+                    let chunks = chunks.zip(damped.par_chunks_mut(CHUNK));
+                    chunks.map(|(((u, v), f), damped)| self.pass(u, v, f, damped)).collect()
+                }
+                None => chunks.map(|((u, v), f)| self.pass(u, v, f, &mut [])).collect(),
+            };
+            squares.iter().sum()
+        })
     }
 
-    /// The pass over some numbers; `ahead` is empty or gets u + τ v.
-    pub fn pass(&self, displacement: &mut [T], velocity: &mut [T], force: &[T], ahead: &mut [T]) -> f64 {
-        let pass = Pass { drift: self, displacement, velocity, force, ahead };
-        match (self.owed, pass.ahead.is_empty()) {
+    /// The pass over some numbers; `damped` is empty or gets u + τ v.
+    pub fn pass<T: Number>(&self, displacement: &mut [T], velocity: &mut [T], force: &[T], damped: &mut [T]) -> f64 {
+        let [keep, dt, tau, still] = [self.keep, self.dt, self.tau, self.still].map(T::from_f64);
+        let pass = Pass { kick: Kick::new(self), keep, dt, tau, still, displacement, velocity, force, damped };
+        match (self.pending, pass.damped.is_empty()) {
             (false, true) => wide(Only::<_, false, false>(pass)),
             (false, false) => wide(Only::<_, false, true>(pass)),
             (true, true) => wide(Only::<_, true, false>(pass)),
             (true, false) => wide(Only::<_, true, true>(pass)),
         }
+    }
+}
+
+/// A kick in the numbers of the fields.
+#[derive(Debug, Clone, Copy)]
+struct Kick<T> {
+    after: T,
+    factor: T,
+    slow: T,
+}
+
+impl<T: Number> Kick<T> {
+    fn new(drift: &Drift) -> Self {
+        let [after, factor, slow] = [drift.after, drift.factor, drift.slow].map(T::from_f64);
+        Kick { after, factor, slow }
     }
 
     /// The last kick of a step; adds v².
@@ -125,63 +146,76 @@ const LANES: usize = 8;
 
 /// What [`Drift::pass`] passes over.
 struct Pass<'a, T> {
-    drift: &'a Drift<T>,
+    kick: Kick<T>,
+    keep: T,
+    dt: T,
+    tau: T,
+    still: T,
     displacement: &'a mut [T],
     velocity: &'a mut [T],
     force: &'a [T],
-    ahead: &'a mut [T],
+    damped: &'a mut [T],
 }
 
-/// A pass that makes up for a kick or does not, and looks ahead or does not.
-struct Only<P, const OWED: bool, const AHEAD: bool>(P);
+/// A pass that makes up for a kick or does not, and fills u + τ v or does not.
+struct Only<P, const PENDING: bool, const DAMPED: bool>(P);
 
-impl<T: Number, const OWED: bool, const AHEAD: bool> Sweep for Only<Pass<'_, T>, OWED, AHEAD> {
+impl<T: Number, const PENDING: bool, const DAMPED: bool> Sweep for Only<Pass<'_, T>, PENDING, DAMPED> {
     type Output = f64;
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Pass { drift, displacement, velocity, force, ahead } = self.0;
+        let Pass { kick, keep, dt, tau, still, displacement, velocity, force, damped } = self.0;
+        let by = [keep, dt, tau, still];
         let mut squares = [0.0; LANES];
         let ((us, u), (vs, v)) = (displacement.as_chunks_mut::<LANES>(), velocity.as_chunks_mut::<LANES>());
-        let ((fs, f), (aheads, ahead)) = (force.as_chunks::<LANES>(), ahead.as_chunks_mut::<LANES>());
-        if AHEAD {
-            for (((u, v), f), ahead) in us.iter_mut().zip(vs).zip(fs).zip(aheads) {
-                Self::some(drift, u, v, f, ahead, &mut squares);
+        let ((fs, f), (damps, damped)) = (force.as_chunks::<LANES>(), damped.as_chunks_mut::<LANES>());
+        if DAMPED {
+            for (((u, v), f), damped) in us.iter_mut().zip(vs).zip(fs).zip(damps) {
+                Self::some(&kick, by, u, v, f, damped, &mut squares);
             }
         } else {
             for ((u, v), f) in us.iter_mut().zip(vs).zip(fs) {
-                Self::some(drift, u, v, f, &mut [], &mut squares);
+                Self::some(&kick, by, u, v, f, &mut [], &mut squares);
             }
         }
-        Self::some(drift, u, v, f, ahead, &mut squares);
+        Self::some(&kick, by, u, v, f, damped, &mut squares);
         squares.iter().sum()
     }
 }
 
-impl<T: Number, const OWED: bool, const AHEAD: bool> Only<Pass<'_, T>, OWED, AHEAD> {
+impl<T: Number, const PENDING: bool, const DAMPED: bool> Only<Pass<'_, T>, PENDING, DAMPED> {
     #[inline(always)]
-    fn some(drift: &Drift<T>, u: &mut [T], v: &mut [T], f: &[T], ahead: &mut [T], squares: &mut [f64; LANES]) {
+    fn some(
+        kick: &Kick<T>,
+        [keep, dt, tau, still]: [T; 4],
+        u: &mut [T],
+        v: &mut [T],
+        f: &[T],
+        damped: &mut [T],
+        squares: &mut [f64; LANES],
+    ) {
         for k in 0..u.len() {
-            if OWED {
-                v[k] = drift.kicked(v[k], f[k], &mut squares[k]);
+            if PENDING {
+                v[k] = kick.kicked(v[k], f[k], &mut squares[k]);
             }
-            v[k] = unless_below(drift.slow, drift.keep * v[k] + drift.factor * f[k]);
-            u[k] = unless_below(drift.still, u[k] + drift.dt * v[k]);
-            if AHEAD {
-                ahead[k] = u[k] + drift.tau * v[k];
+            v[k] = unless_below(kick.slow, keep * v[k] + kick.factor * f[k]);
+            u[k] = unless_below(still, u[k] + dt * v[k]);
+            if DAMPED {
+                damped[k] = u[k] + tau * v[k];
             }
         }
     }
 }
 
-/// The last kick of a step alone.
-struct Kick<'a, T> {
-    drift: &'a Drift<T>,
+/// The last kick of a step alone, of some numbers.
+struct Chunk<'a, T> {
+    kick: Kick<T>,
     velocity: &'a mut [T],
     force: &'a [T],
 }
 
-impl<T: Number> Sweep for Kick<'_, T> {
+impl<T: Number> Sweep for Chunk<'_, T> {
     type Output = f64;
 
     #[inline(always)]
@@ -190,11 +224,11 @@ impl<T: Number> Sweep for Kick<'_, T> {
         let ((vs, v), (fs, f)) = (self.velocity.as_chunks_mut::<LANES>(), self.force.as_chunks::<LANES>());
         for (v, f) in vs.iter_mut().zip(fs) {
             for k in 0..LANES {
-                v[k] = self.drift.kicked(v[k], f[k], &mut squares[k]);
+                v[k] = self.kick.kicked(v[k], f[k], &mut squares[k]);
             }
         }
         for k in 0..v.len() {
-            v[k] = self.drift.kicked(v[k], f[k], &mut squares[k]);
+            v[k] = self.kick.kicked(v[k], f[k], &mut squares[k]);
         }
         squares.iter().sum()
     }
@@ -213,25 +247,23 @@ pub(super) fn unless_below<T: Number>(limit: T, x: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::unknown::Numbers;
 
     /// u¨ = −u − c u̇
     struct Oscillator([f64; 3]);
 
     impl System for Oscillator {
-        type Number = f64;
-        fn unknowns(&mut self) -> Unknowns<'_, f64> {
-            let [u, v, f] = &mut self.0;
-            Unknowns {
-                displacement: std::slice::from_mut(u),
-                velocity: std::slice::from_mut(v),
-                force: std::slice::from_ref(f),
+        fn unknown(&mut self) -> Unknown<'_> {
+            let [u, v, f] = self.0.each_mut().map(std::slice::from_mut);
+            Unknown {
+                vectors: Numbers::Double(Vectors { value: u, velocity: v, rate: f, damped: None }),
+                components: 1,
                 inertia: 1.0,
                 negligible: 0.0,
-                ahead: None,
             }
         }
         fn constrain(&mut self, _: Stage, _: f64, _: f64) {}
-        fn evaluate(&mut self, _: f64, _: f64) {
+        fn evolve(&mut self, _: f64, _: f64) {
             self.0[2] = -self.0[0];
         }
         fn stable_step(&self) -> f64 {
@@ -251,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn kicks_that_are_owed_are_those_of_whole_steps() {
+    fn kicks_that_are_pending_are_those_of_whole_steps() {
         let method = VelocityVerlet { damping: 0.3 };
         let (mut whole, mut owing) = (Oscillator([1.0, 0.2, -1.0]), Oscillator([1.0, 0.2, -1.0]));
         let (mut clock, mut other) = (Clock::new(0.1), Clock::new(0.1));

@@ -8,13 +8,11 @@ use super::family_counts::block;
 use super::{Measure, Outcome, Row};
 use crate::discretization::{BondWeights, Influence, Operator, PartialVolume};
 use crate::error::Result;
-use crate::execution::Exec;
 use crate::family::Families;
 use crate::output::plot::{Plot, Series, Style, draw_plot};
-use crate::physics::Elasticity;
-use crate::physics::elasticity::State;
-use crate::physics::elasticity::bond_based::BondBasedLinear;
+use crate::physics::elasticity::laws::BondBasedLinear;
 use crate::physics::elasticity::moduli::{Hypothesis, critical_stretch, micromodulus};
+use crate::physics::elasticity::{Bonds, Elasticity};
 
 const ORIGIN: &str = "lattice sums of an independent script, four digits printed; the tolerance is the last of them";
 
@@ -48,10 +46,9 @@ fn from_bond_sums<const D: usize>(hypothesis: Hypothesis, rule: PartialVolume, m
     let (body, middle) = block::<D>(rule, m);
     let strength = micromodulus(hypothesis, &influence, 1.0, m);
     let operator = Operator::standard(&body, strength, influence, rule);
-    let physics = Elasticity { law: BondBasedLinear, density: 1.0, operator, failure: None, state_based: None };
-    let mut exec = Exec::default();
+    let mut elasticity = Elasticity::<D>::new(body, operator, Box::new(Bonds(BondBasedLinear)), 1.0, None);
     let mut energy = |strain: [f64; 2]| {
-        let mut state: State = physics.initial_state(&body);
+        let Elasticity { body, state, .. } = &mut elasticity;
         let n = body.cloud.n_slots();
         for &slot in &body.cloud.slots {
             let x = body.cloud.position(slot as usize);
@@ -59,16 +56,16 @@ fn from_bond_sums<const D: usize>(hypothesis: Hypothesis, rule: PartialVolume, m
                 state.displacement[d * n + slot as usize] = strain[d] * x[d];
             }
         }
-        let mut density = vec![0.0; n];
-        physics.strain_energy_density(&body, &mut exec, &state, &mut density);
-        density[body.cloud.slots[middle] as usize]
+        let here = body.cloud.slots[middle] as usize;
+        elasticity.energy_density()[here]
     };
     // W = ½ C₁₁ ε₁² + C₁₂ ε₁ ε₂ + ½ C₁₁ ε₂²
     let c11 = 2.0 * energy([1.0, 0.0]);
     let c12 = energy([1.0, 1.0]) - c11;
     let exact = hypothesis.stiffness(1.0);
     let s0 = critical_stretch(hypothesis, &influence, strength, 1.0, m);
-    let (Families::Lattice(families), BondWeights::Lattice(weights)) = (&body.families, &physics.operator.weights)
+    let (Families::Lattice(families), BondWeights::Lattice(weights)) =
+        (&elasticity.body.families, &elasticity.operator.weights)
     else {
         unreachable!("a block of cells is a lattice")
     };

@@ -13,8 +13,8 @@ use crate::field::{difference, norm};
 use crate::output::picture::{CloudView, Image, Picture, draw};
 use crate::output::plot::{Plot, Series, Style, draw_plot};
 use crate::output::source::{Source, scalar};
+use crate::physics::elasticity::Work;
 use crate::problem::Balance;
-use crate::problem::hybrid::Work;
 
 pub const STUDY: Study = Study {
     name: "hybrid-branching",

@@ -20,6 +20,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::{Measure, Outcome, Row, Study};
+use crate::conditions::Stage;
 use crate::discretization::collocation::gate::bearable_in_diffusion;
 use crate::discretization::quadrature::gauss_legendre;
 use crate::discretization::{Collocation, Influence, PartialVolume, standard};
@@ -31,8 +32,8 @@ use crate::geometry::{Cloud, Shape};
 use crate::output::plot::{Plot, Series, Style, draw_plot};
 use crate::physics::Diffusion;
 use crate::physics::diffusion::Flux;
-use crate::solver::Clock;
-use crate::solver::forward_euler::{ForwardEuler, Rated};
+use crate::solver::{Clock, ForwardEuler, System};
+use crate::unknown::{Numbers, Unknown, Vectors};
 
 pub const STUDY: Study = Study {
     name: "hybrid-example-2",
@@ -201,6 +202,7 @@ impl Square {
     /// C, P itself, at `frames` times.
     fn march(&mut self, dt: f64, end: f64, frames: u32) -> (f64, Vec<(f64, f64)>) {
         self.concentration.fill(0.0);
+        self.evolve(0.0, 0.0);
         let steps = (end / dt).round() as u64;
         let mut clock = Clock::new(dt);
         let mut course = Vec::new();
@@ -221,19 +223,25 @@ impl Square {
     }
 }
 
-impl Rated for Square {
-    type Number = f64;
-    fn evaluate(&mut self, t: f64) {
+impl System for Square {
+    fn unknown(&mut self) -> Unknown<'_> {
+        let (value, rate) = (&mut self.concentration[..], &mut self.rate[..]);
+        Unknown {
+            vectors: Numbers::Double(Vectors { value, velocity: &mut [], rate, damped: None }),
+            components: 1,
+            inertia: 1.0,
+            negligible: 0.0,
+        }
+    }
+    fn evolve(&mut self, t: f64, _: f64) {
         self.diffusion.rate(&self.body, &mut self.exec, &self.concentration, &mut self.rate);
         let (grows, spreads) = (5.0 * (5.0 * t).cos(), (5.0 * t).sin());
         for slot in self.free.iter().map(|&slot| slot as usize) {
             self.rate[slot] += grows * self.shape[slot] - spreads * self.bulge[slot];
         }
     }
-    fn unknowns(&mut self) -> (&mut [f64], &[f64]) {
-        (&mut self.concentration, &self.rate)
-    }
-    fn constrain(&mut self, t: f64) {
+    fn constrain(&mut self, _: Stage, t: f64, dt: f64) {
+        let t = t + dt;
         for slot in self.layer.iter().map(|&slot| slot as usize) {
             self.concentration[slot] = (5.0 * t).sin() * self.shape[slot];
         }

@@ -11,7 +11,7 @@ use crate::discretization::influence::Influence;
 use crate::discretization::quadrature::gauss_legendre;
 use crate::error::Result;
 use crate::family::{Bond, BondLaw};
-use crate::physics::elasticity::bond_based::BondBasedLinear;
+use crate::physics::elasticity::laws::BondBasedLinear;
 use crate::physics::elasticity::moduli::{Hypothesis, micromodulus};
 
 const YOUNG: f64 = 72e9;

@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use super::super::model::{self, Formula, Motion};
 use super::Builder;
-use crate::conditions::load::Scale;
 use crate::conditions::profile::VARIABLES;
-use crate::conditions::{Load, Prescribed, Profile, Quantity};
+use crate::conditions::{Constraint, Load, Prescribed, Profile, Quantity, Scale, Term};
 use crate::error::{Error, Result};
 use crate::expression::{Expression, nearest};
 use crate::field::Vector;
@@ -61,25 +60,18 @@ impl<const D: usize> Builder<'_, D> {
         motion: &Motion,
         cloud: &Cloud<D>,
         slots: Arc<[u32]>,
-    ) -> Result<Prescribed> {
+    ) -> Result<Box<dyn Constraint>> {
         let condition = &self.case.value.conditions[k];
         let path = format!("conditions[{k}].prescribe.{}.value", motion_name(motion));
         let (quantity, component, value) = match motion {
-            Motion::Displacement { component, value } => (Quantity::Displacement, *component, value),
+            Motion::Displacement { component, value } => (Quantity::Value, *component, value),
             Motion::Velocity { component, value } => (Quantity::Velocity, *component, value),
         };
-        Ok(Prescribed {
-            name: format!("{}_{}", condition.on, ["x", "y", "z"][component]),
-            profile: self.profile(value, cloud, &slots, &path)?,
-            slots,
-            component,
-            quantity,
-            until: condition.until.unwrap_or(f64::INFINITY),
-            reaction: 0.0,
-            last: Vec::new(),
-            path: Vec::new(),
-            so_far: 0.0,
-        })
+        let name = format!("{}_{}", condition.on, ["x", "y", "z"][component]);
+        let profile = self.profile(value, cloud, &slots, &path)?;
+        let mut prescribed = Prescribed::new(name, slots, component, quantity, profile);
+        prescribed.until = condition.until.unwrap_or(f64::INFINITY);
+        Ok(Box::new(prescribed))
     }
 
     /// The load of `conditions[k]`.
@@ -90,7 +82,7 @@ impl<const D: usize> Builder<'_, D> {
         cloud: &Cloud<D>,
         shape: Option<&Shape<D>>,
         slots: &Arc<[u32]>,
-        loads: &mut Vec<Load>,
+        terms: &mut Vec<Box<dyn Term>>,
     ) -> Result<()> {
         let until = self.case.value.conditions[k].until.unwrap_or(f64::INFINITY);
         let kind = match load {
@@ -101,7 +93,9 @@ impl<const D: usize> Builder<'_, D> {
         let path = format!("conditions[{k}].load.{kind}.value");
         let mut push = |component, value: &Formula, scale| -> Result<()> {
             let profile = self.profile(value, cloud, slots, &path)?;
-            loads.push(Load { slots: slots.clone(), component, profile, scale, until, last: None });
+            let mut load = Load::new(slots.clone(), component, profile);
+            (load.scale, load.until) = (scale, until);
+            terms.push(Box::new(load));
             Ok(())
         };
         match load {

@@ -18,7 +18,7 @@ use crate::expression::Expression;
 use crate::family::Rule;
 use crate::field::Vector;
 use crate::geometry::{Arrangement, Cloud, Crack, Shape};
-use crate::problem::adapt::{Adaptation, INDICATORS};
+use crate::physics::elasticity::{Adaptation, INDICATORS};
 use crate::refinement::{Cells, Transition};
 
 impl<const D: usize> Builder<'_, D> {

@@ -8,27 +8,26 @@ use crate::discretization::moments::ball_moment;
 use crate::discretization::{BondWeights, Collocation, Regions, Scaling};
 use crate::error::{Error, Result};
 use crate::execution::{Limits, Packs};
-use crate::family::{Body, BondLaw, Families};
+use crate::family::{Body, Families};
 use crate::geometry::Arrangement;
-use crate::physics::Elasticity;
-use crate::physics::elasticity::State;
+use crate::physics::elasticity::hybrid::Dilatation;
+use crate::physics::elasticity::linear_solid::Moduli;
+use crate::physics::elasticity::{Elasticity, Hybrid};
 use crate::physics::failure::CriticalStretch;
-use crate::problem::Hybrid;
-use crate::problem::hybrid::Dilatation;
 
 const PATH: &str = "discretization.scheme.hybrid";
 
 impl<const D: usize> Builder<'_, D> {
-    /// `unit`: δ/√(E/ρ), s.
-    pub(super) fn hybrid<L: BondLaw<D>, P: Packs>(
+    /// Puts rows over the material of a body. `unit`: δ/√(E/ρ), s.
+    pub(super) fn hybridise<P: Packs>(
         &self,
         settings: &model::Hybrid,
-        body: &Body<D>,
-        physics: &Elasticity<L>,
-        state: &State<P>,
+        elasticity: Elasticity<D, P>,
+        solid: Option<Moduli>,
         scaling: &Scaling,
         unit: f64,
-    ) -> Result<Hybrid<D, P>> {
+    ) -> Result<Elasticity<D, P>> {
+        let (body, density, failure) = (&elasticity.body, elasticity.density, &elasticity.failure);
         let Arrangement::Lattice(lattice) = &body.cloud.arrangement else {
             return Err(self.refuse(PATH, "the hybrid scheme is for lattices", ""));
         };
@@ -36,51 +35,53 @@ impl<const D: usize> Builder<'_, D> {
         let collocation = Collocation { order: settings.order, points, exponent: settings.exponent };
         let refuse = |error: Error| self.refuse(PATH, error.to_string(), "");
         let (influence, micromodulus) = (scaling.influence, scaling.strength);
-        let solid = physics.state_based.as_ref();
         let kernel = match solid {
             None => Law::Elastic { influence, micromodulus },
             Some(solid) => {
-                let volumetric = solid.moduli.volumetric / (D * D) as f64;
+                let volumetric = solid.volumetric / (D * D) as f64;
                 Law::StateBased { influence, micromodulus, volumetric }
             }
         };
         // Noise may grow tenfold in the run.
         let end_time = self.case.value.solver.stages().map(|(_, solver)| solver.end_time()).fold(0.0, f64::max);
-        let bearable = bearable_in_motion(end_time, physics.density);
+        let bearable = bearable_in_motion(end_time, density);
         let (fit, symbol) = collocation
             .marched::<D>(lattice.spacing, scaling.horizon, &kernel, bearable)
             .map_err(|error| self.refuse(PATH, error.to_string(), "leave out `order`, `points` and `exponent`"))?;
         let weights = fit.elastic(&scaling.influence, scaling.strength);
         let row = SharedRow::new(lattice, &fit, &weights).map_err(refuse)?;
         let standard = self.standard_from_the_start(settings, body)?;
-        let regions = Regions::new(body, &state.states, standard, settings.buffer);
+        let regions = Regions::new(body, &elasticity.state.states, standard, settings.buffer);
         if regions.collocated_points() == 0 {
             let message = "every point is near a boundary, a pre-crack or a named set: all sum their bonds";
             log::warn!("{}", self.source().warning(PATH, message));
         }
-        let smallest = physics.failure.as_ref().map_or(f64::INFINITY, CriticalStretch::smallest);
+        let smallest = failure.as_ref().map_or(f64::INFINITY, CriticalStretch::smallest);
         let at = if settings.adaptive { settings.switch_at * smallest } else { smallest };
-        let linear = L::LINEAR;
+        let linear = elasticity.material.is_linear();
         let limits = Limits {
             // The measure of both laws: ½ (|y|²/|ξ|² − 1), or s.
             strain: if linear { at } else { at + 0.5 * at * at },
             linear,
             gradient: if linear { f64::INFINITY } else { settings.largest_gradient },
         };
-        let mut hybrid = Hybrid::new(regions, row, symbol.radius, limits);
         // A point whose family is whole; without one there are no rows.
-        let inside = body.cloud.slots.iter().copied().find(|&slot| hybrid.regions.has_row(slot as usize));
-        if let (Some(solid), Some(slot)) = (solid, inside) {
-            let [stiffness, bulk] = solid.of(slot as usize);
-            let moment = solid.moduli.deviatoric / stiffness;
+        let inside = body.cloud.slots.iter().copied().find(|&slot| regions.has_row(slot as usize));
+        let scales = inside.and_then(|slot| elasticity.material.dilatation_scales(slot as usize));
+        let mut dilatation = None;
+        if let (Some(solid), Some([stiffness, bulk])) = (solid, scales) {
+            let moment = solid.deviatoric / stiffness;
             let per = moment / D as f64;
             let slope = SharedSlope::new(lattice, &fit, &fit.dilatation(&influence)).map_err(refuse)?;
-            let scales = [solid.moduli.volumetric / (moment * D as f64), per];
-            hybrid.dilatation = Some(Dilatation { slope, scales, bulk });
+            let scales = [solid.volumetric / (moment * D as f64), per];
+            dilatation = Some(Dilatation { slope, scales, bulk });
         }
-        hybrid.damping = settings.damping * unit;
-        (hybrid.damps_bonds, hybrid.adaptive) = (settings.damp_bonds, settings.adaptive);
-        Ok(hybrid)
+        Ok(elasticity.hybridised(|inner| {
+            let mut hybrid = Hybrid::new(inner, regions, row, symbol.radius, limits);
+            (hybrid.dilatation, hybrid.damping) = (dilatation, settings.damping * unit);
+            (hybrid.damps_bonds, hybrid.adaptive) = (settings.damp_bonds, settings.adaptive);
+            hybrid
+        }))
     }
 
     /// Slots of the sets that are named, of no-fail sets, and of what is prescribed or loaded on its surface.
@@ -112,8 +113,9 @@ impl<const D: usize> Builder<'_, D> {
 
 /// Scales the weights of a lattice so that Σ w |ξ| is the integral ∫ c ω |ξ| dV, to which the energy of expansion and the mean
 /// stiffness over all directions are proportional.
-pub(super) fn rescale<const D: usize, L>(physics: &mut Elasticity<L>, body: &Body<D>, scaling: &Scaling) {
-    let (Families::Lattice(families), BondWeights::Lattice(weights)) = (&body.families, &mut physics.operator.weights)
+pub(super) fn rescale<const D: usize, P: Packs>(elasticity: &mut Elasticity<D, P>, scaling: &Scaling) {
+    let (Families::Lattice(families), BondWeights::Lattice(weights)) =
+        (&elasticity.body.families, &mut elasticity.operator.weights)
     else {
         return;
     };

@@ -48,6 +48,10 @@ impl Law {
         matches!(self, Law::StateBased(_) | Law::StateBasedLinear(_))
     }
 
+    pub fn is_linear(&self) -> bool {
+        matches!(self, Law::BondBasedLinear(_) | Law::StateBasedLinear(_))
+    }
+
     /// What all laws are given.
     pub fn parameters(&self) -> BondBased {
         match self {

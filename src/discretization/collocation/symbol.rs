@@ -268,8 +268,8 @@ mod tests {
     use super::*;
     use crate::discretization::{Influence, PartialVolume};
     use crate::field::norm;
+    use crate::physics::elasticity::linear_solid::Moduli;
     use crate::physics::elasticity::moduli::Hypothesis;
-    use crate::physics::elasticity::state_based::Moduli;
 
     /// E = δ = 1.
     fn law<const D: usize>() -> Law {

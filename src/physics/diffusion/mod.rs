@@ -249,7 +249,7 @@ impl<const D: usize> BondKernel<D, 1, 1> for Conduction {
     const LINEAR: bool = true;
 
     #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, [relative]: &[L; 1], _: L, [sum]: [L; 1]) -> [L; 1] {
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, [relative]: &[L; 1], _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
         [conductance(bond, self.0).mul_add(*relative, sum)]
     }
 }
@@ -261,7 +261,7 @@ impl<const D: usize> BondKernel<D, 0, 1> for Conductance {
     const RELATIVE: bool = false;
 
     #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
         [sum + conductance(bond, self.0)]
     }
 }

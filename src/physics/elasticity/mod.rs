@@ -1,36 +1,66 @@
 //! Elastic bodies that break: ρ ü = Σ μ f(ξ, η) β V′ + b.
 //!
-//! The equation of motion of Silling & Askari (2005), discretised as in Shojaei et al. 2022, eq. (26).
+//! The equation of motion of Silling & Askari (2005), discretised as in Shojaei et al. 2022, eq. (26). What is inside, and
+//! of which law, is a [`Material`].
 
-pub mod bond_based;
+mod adapt;
+pub mod bonds;
+pub mod hybrid;
+mod kernels;
+pub mod laws;
+pub mod linear_solid;
+pub mod material;
 pub mod moduli;
-pub mod state_based;
 pub mod surface;
+mod tangent;
 
-use std::sync::Mutex;
+use std::ops::Range;
 
-use crate::discretization::{BondWeights, Operator, Regions};
-use crate::execution::{BlockRow, BreakRule, Broken, Exec, Packs};
-use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
-use crate::field::{Double, Number, Precision, components, components_mut, dot};
-use crate::lane::Lane;
+use rayon::prelude::*;
+
+pub use adapt::{Adaptation, INDICATORS};
+pub use bonds::Bonds;
+pub use hybrid::{Hybrid, Work};
+use kernels::bonded_volume;
+pub use linear_solid::LinearSolid;
+pub use material::{Edge, Material, On, Overstretched};
+
+use super::{Adapted, Balance, Column, Content, FieldInfo, Physics, Points, Replaced};
+use crate::discretization::Operator;
+use crate::execution::{Broken, Exec, Packs};
+use crate::family::{Body, BondStates, Families};
+use crate::field::{Double, Field, Number, Precision, Values, components, embed};
+use crate::geometry::{Arrangement, Crack};
 use crate::physics::failure::CriticalStretch;
-use state_based::{Changing, StateBased};
+use crate::solver::Drift;
+use crate::unknown::{Unknown, Vectors};
+use crate::visit::Visitor;
 
-/// A law, its discretisation and its failure on one body.
-#[derive(Debug, Clone)]
-pub struct Elasticity<L> {
-    pub law: L,
+/// An elastic body: its points and bonds, what it is made of, and where it stands.
+pub struct Elasticity<const D: usize, P: Packs = Double> {
+    pub body: Body<D>,
+    pub operator: Operator,
     /// ρ, kg/m³ (2D: unit thickness; 1D: unit cross-section).
     pub density: f64,
-    pub operator: Operator,
     /// None: bonds never break.
     pub failure: Option<CriticalStretch>,
-    /// The state-based solid that `law` gives the stretches of, in double precision; None: `law` is the whole law.
-    pub state_based: Option<StateBased>,
+    pub material: Box<dyn Material<D, P>>,
+    pub state: State<P>,
+    pub exec: Exec,
+    /// Σ β V′ over the family before any bond broke, by slot: what damage is measured against.
+    family_volume: Vec<P::Field>,
+    /// Directed bonds of the body, and how many of them the pre-cracks cut.
+    n_bonds: u64,
+    n_cut: u64,
+    /// How cells follow the solution; None if they do not.
+    adaptation: Option<Box<Adaptation<D>>>,
+    /// What each point belongs to: only points of one class are merged.
+    merge_class: Vec<u32>,
+    adapted: Adapted,
+    generation: u64,
 }
 
-/// Everything that changes in a run of an elastic body.
+/// The vectors and bonds of an elastic body.
 #[derive(Debug, Clone)]
 pub struct State<P: Precision = Double> {
     /// Displacement, m; component after component over all slots.
@@ -43,13 +73,11 @@ pub struct State<P: Precision = Double> {
     pub states: BondStates,
     /// Broken since the start, pre-cracks not counted.
     pub broken: Broken,
-    /// Of a state-based solid: p, what dilatation pulls with, now and one evaluation before, by slot; else empty.
-    pub tension: [Vec<f64>; 2],
 }
 
-impl<L> Elasticity<L> {
+impl<P: Precision> State<P> {
     /// At rest, all bonds whole.
-    pub fn initial_state<const D: usize, P: Precision>(&self, body: &Body<D>) -> State<P> {
+    pub fn new<const D: usize>(body: &Body<D>) -> Self {
         let zeros = || vec![P::Field::default(); D * body.cloud.n_slots()];
         State {
             displacement: zeros(),
@@ -57,385 +85,471 @@ impl<L> Elasticity<L> {
             force: zeros(),
             states: BondStates::whole(body),
             broken: Broken::default(),
-            tension: Default::default(),
         }
     }
+}
 
-    /// Breaks the bonds that the displacements overstretch, then fills `state.force` with the internal force density.
-    ///
-    /// `dt`: the step that led to these displacements with the velocities as they are now, for the books of the
-    /// energy that broken bonds take; zero at the start. `hybrid`: the points whose bonds are not asked, if any.
-    pub fn evaluate<const D: usize, P: Packs>(
-        &self,
-        body: &Body<D>,
-        exec: &mut Exec,
-        state: &mut State<P>,
-        dt: f64,
-        hybrid: Option<&Edge<'_>>,
-    ) where
-        L: BondLaw<D>,
-    {
-        if self.state_based.is_some() {
-            state.changing().turn();
-            self.extend(body, exec, state, dt, self.failure.as_ref(), hybrid);
-            return self.pull(body, exec, state);
-        }
-        let (input, output) = (components::<D, _>(&state.displacement), components_mut::<D, _>(&mut state.force));
-        let Some(failure) = &self.failure else {
-            return self.force_density::<D, P>(body, exec, &state.states, input, output);
+impl<const D: usize, P: Packs> Elasticity<D, P> {
+    /// A body at rest whose bonds are whole. `density` in kg/m³.
+    pub fn new(
+        body: Body<D>,
+        operator: Operator,
+        material: Box<dyn Material<D, P>>,
+        density: f64,
+        failure: Option<CriticalStretch>,
+    ) -> Self {
+        let state = State::new(&body);
+        let mut elasticity = Elasticity {
+            body,
+            operator,
+            density,
+            failure,
+            material,
+            n_bonds: state.states.count(),
+            state,
+            exec: Exec::default(),
+            family_volume: Vec::new(),
+            n_cut: 0,
+            adaptation: None,
+            merge_class: Vec::new(),
+            adapted: Adapted::default(),
+            generation: 0,
         };
-        let (law, velocity) = (self.law, components::<D, _>(&state.velocity));
-        let rule = Breaking::<D, L, P::Field> { failure, law, displacement: input, velocity, dt, hybrid };
-        let now = self.break_by::<D, P>(body, exec, &mut state.states, input, output, &rule);
-        state.broken.bonds += now.bonds;
-        state.broken.energy += now.energy;
+        elasticity.measure_families();
+        elasticity
     }
 
-    /// The first pass of a state-based solid: [`StateBased::extend`].
-    ///
-    /// # Panics
-    /// If it is of bonds.
-    pub fn extend<const D: usize, P: Packs>(
-        &self,
-        body: &Body<D>,
-        exec: &mut Exec,
-        state: &mut State<P>,
-        dt: f64,
-        failure: Option<&CriticalStretch>,
-        hybrid: Option<&Edge<'_>>,
-    ) {
-        let solid = self.state_based.as_ref().expect(TWO_PASSES);
-        solid.extend(body, &self.operator.weights, failure, exec, &mut state.changing(), dt, hybrid);
+    /// Breaks the bonds that cross a pre-crack; how many, both directions counted. `tolerance`, m: what counts as touching.
+    pub fn cut(&mut self, crack: &Crack<D>, tolerance: f64) -> u64 {
+        let cut = self.state.states.cut(&self.body, crack, tolerance);
+        self.n_cut += cut;
+        cut
     }
 
-    /// The second: [`StateBased::pull`].
-    ///
-    /// # Panics
-    /// If it is of bonds.
-    pub fn pull<const D: usize, P: Packs>(&self, body: &Body<D>, exec: &mut Exec, state: &mut State<P>) {
-        let solid = self.state_based.as_ref().expect(TWO_PASSES);
-        solid.pull(body, &self.operator.weights, exec, &mut state.changing());
+    /// From here on points have rows as the hybrid scheme that `over` puts over the material says. Before the start.
+    pub fn hybridised(self, over: impl FnOnce(Box<dyn Material<D, P>>) -> Hybrid<D, P>) -> Self {
+        let mut elasticity = self;
+        let mut hybrid = over(elasticity.material);
+        hybrid.begin(&elasticity.body, &mut elasticity.exec);
+        elasticity.material = Box::new(hybrid);
+        elasticity
     }
 
-    /// Internal force density (N/m³) at given displacements; no bond breaks.
-    pub fn force_density<const D: usize, P: Packs>(
-        &self,
-        body: &Body<D>,
-        exec: &mut Exec,
-        states: &BondStates,
-        displacement: [&[P::Field]; D],
-        force: [&mut [P::Field]; D],
-    ) where
-        L: BondLaw<D>,
-    {
-        let weights = &self.operator.weights;
-        if let Some(solid) = &self.state_based {
-            let (displacement, mut force) = (displacement.map(doubles), force.map(doubles_mut));
-            return solid.force_density(body, weights, exec, states, &displacement, &mut force);
-        }
-        exec.sum_bonds::<D, D, D, P>(body, weights, states, displacement, force, &Force(self.law));
+    /// The material, what its passes run over, and the state that they change.
+    pub fn parts(&mut self) -> (&mut dyn Material<D, P>, On<'_, D>, &mut State<P>) {
+        let Elasticity { body, operator, failure, material, state, exec, .. } = self;
+        (&mut **material, On { body, operator, failure: failure.as_ref(), exec }, state)
     }
 
-    /// The same, after the bonds that `rule` breaks at these displacements are broken.
-    pub fn break_by<const D: usize, P: Packs>(
-        &self,
-        body: &Body<D>,
-        exec: &mut Exec,
-        states: &mut BondStates,
-        displacement: [&[P::Field]; D],
-        force: [&mut [P::Field]; D],
-        rule: &impl BreakRule<D>,
-    ) -> Broken
-    where
-        L: BondLaw<D>,
-    {
-        assert!(self.state_based.is_none(), "bonds of a state-based solid break in `evaluate` only");
-        let (weights, kernel) = (&self.operator.weights, Force(self.law));
-        exec.sum_bonds_and_break::<D, D, D, P>(body, weights, states, displacement, force, &kernel, rule)
+    /// Strain energy density by slot, J/m³.
+    pub fn energy_density(&mut self) -> Vec<P::Field> {
+        let mut density = vec![P::Field::default(); self.body.cloud.n_slots()];
+        let (material, mut on, state) = self.parts();
+        material.energy_density(&mut on, &state.states, components::<D, _>(&state.displacement), &mut density);
+        density
     }
 
-    /// Diagonal of the stiffness at rest, Σ k e_d² β V′ with e = ξ/|ξ| (N/m⁴), by slot and component.
-    pub fn diagonal<const D: usize>(
-        &self,
-        body: &Body<D>,
-        exec: &mut Exec,
-        states: &BondStates,
-        mut diagonal: [&mut [f64]; D],
-    ) where
-        L: BondLaw<D>,
-    {
-        if let Some(solid) = &self.state_based {
-            return solid.diagonal(body, &self.operator.weights, exec, states, &mut diagonal);
-        }
-        let (weights, kernel) = (&self.operator.weights, Diagonal(self.law));
-        exec.sum_bonds::<D, 0, D, Double>(body, weights, states, [], diagonal, &kernel);
+    /// Takes note of what families were before any bond broke.
+    fn measure_families(&mut self) {
+        let mut volume = vec![0.0; self.body.cloud.n_slots()];
+        let whole = BondStates::whole(&self.body);
+        bonded_volume(&mut self.exec, &self.body, &self.operator.volumes, &whole, &mut volume);
+        self.n_bonds = whole.count();
+        self.family_volume = volume.into_iter().map(P::Field::from_f64).collect();
     }
 
-    /// Row `row` of the block of each point on the diagonal of −∂force/∂u at rest: Σ e_row e_d k β V′ over whole bonds,
-    /// N/m⁴ in 3D.
-    pub fn diagonal_row<const D: usize>(
-        &self,
-        row: usize,
-        body: &Body<D>,
-        exec: &mut Exec,
-        states: &BondStates,
-        sums: [&mut [f64]; D],
-    ) where
-        L: BondLaw<D>,
-    {
-        let (weights, kernel) = (&self.operator.weights, DiagonalRow(self.law, row));
-        exec.sum_bonds::<D, 0, D, Double>(body, weights, states, [], sums, &kernel);
-    }
-
-    /// ∂f/∂η of every whole bond at these displacements (m), weighted, by the slot of x.
-    pub fn stiffness<const D: usize>(
-        &self,
-        body: &Body<D>,
-        states: &BondStates,
-        displacement: [&[f64]; D],
-    ) -> Vec<BlockRow<D>>
-    where
-        L: BondLaw<D>,
-    {
-        assert!(self.state_based.is_none(), "points of a state-based solid feel more than their families");
-        let law = self.law;
-        Exec::blocks(body, &self.operator.weights, states, displacement, |bond, eta| law.stiffness(bond, eta))
-    }
-
-    /// Strain energy density at each slot, W = ½ Σ w β V′ (J/m³); eq. (9).
-    pub fn strain_energy_density<const D: usize, P: Packs>(
-        &self,
-        body: &Body<D>,
-        exec: &mut Exec,
-        state: &State<P>,
-        density: &mut [P::Field],
-    ) where
-        L: BondLaw<D>,
-    {
-        let input = components::<D, _>(&state.displacement);
-        if let Some(solid) = &self.state_based {
-            let (input, density) = (input.map(doubles), doubles_mut(density));
-            return solid.strain_energy_density(body, &self.operator.weights, exec, &state.states, &input, density);
-        }
-        let (weights, kernel) = (&self.operator.weights, Energy(self.law));
-        exec.sum_bonds::<D, D, 1, P>(body, weights, &state.states, input, [density], &kernel);
-    }
-
-    /// Σ β V′ over the bonds that `states` holds, at each slot.
-    pub fn bonded_volume<const D: usize>(
-        &self,
-        body: &Body<D>,
-        exec: &mut Exec,
-        states: &BondStates,
-        volume: &mut [f64],
-    ) {
-        exec.sum_bonds::<D, 0, 1, Double>(body, &self.operator.volumes, states, [], [volume], &Weight);
-    }
-
-    /// Largest stable step of velocity Verlet, s: Δt = √(2ρ / max Σ k β V′), k the spring constant of a bond.
-    ///
-    /// Silling & Askari (2005), by a Gershgorin bound on the spectral radius: never too large for a linear body, and
-    /// for stretches far below one not too large for a nonlinear one either.
-    pub fn stable_step<const D: usize>(&self, body: &Body<D>) -> f64
-    where
-        L: BondLaw<D>,
-    {
-        if let Some(solid) = &self.state_based {
-            return solid.stable_step(self.density);
-        }
-        let stiffest = match (&body.families, &self.operator.weights) {
-            (Families::Lattice(families), BondWeights::Lattice(weights)) => {
-                families.offsets.iter().zip(weights).map(|(o, w)| self.law.tangent(o.length, *w)).sum::<f64>()
-            }
-            (Families::Cloud(_), weights) => {
-                let mut spring = vec![0.0; body.cloud.n_slots()];
-                let whole = BondStates::whole(body);
-                let kernel = Tangent(self.law);
-                Exec::default().sum_bonds::<D, 0, 1, Double>(body, weights, &whole, [], [&mut spring], &kernel);
-                spring.into_iter().fold(0.0, f64::max)
-            }
-            _ => unreachable!("weights are built on the families of their body"),
+    /// φ = 1 − Σ μ β V′ / Σ β V′ by slot; Shojaei et al. 2022, eq. (21).
+    fn damage(&mut self) -> Vec<f64> {
+        // Points with a row have lost no bond.
+        let mut now: Vec<f64> = self.family_volume.iter().map(|whole| whole.to_f64()).collect();
+        bonded_volume(&mut self.exec, &self.body, &self.operator.volumes, &self.state.states, &mut now);
+        let damage = |(now, whole): (&f64, &P::Field)| {
+            let [now, whole] = [P::Field::from_f64(*now), *whole].map(P::Field::to_f64);
+            if whole > 0.0 { 1.0 - now / whole } else { 0.0 }
         };
-        (2.0 * self.density / stiffest).sqrt()
+        now.par_iter().zip(&self.family_volume).map(damage).collect()
     }
+
+    /// One of the vectors at some slots.
+    fn vectors(&self, flat: &[P::Field], slots: &[u32]) -> Values {
+        let parts = components::<D, _>(flat);
+        Values::Vector(gather(slots, &|slot| embed::<D>(&std::array::from_fn(|d| parts[d][slot].to_f64()))))
+    }
+
+    /// The fields, each with what computes it at some slots. A line here is all that a field takes.
+    const FIELDS: &'static [(FieldInfo, FieldOf<D, P>)] = &[
+        (DISPLACEMENT, |body, slots| body.vectors(&body.state.displacement, slots)),
+        (VELOCITY, |body, slots| body.vectors(&body.state.velocity, slots)),
+        (FORCE, |body, slots| body.vectors(&body.state.force, slots)),
+        (DAMAGE, |body, slots| {
+            let damage = body.damage();
+            Values::Scalar(gather(slots, &|slot| damage[slot]))
+        }),
+        (STRAIN_ENERGY, |body, slots| {
+            let density = body.energy_density();
+            Values::Scalar(gather(slots, &|slot| density[slot].to_f64()))
+        }),
+        (SCHEME, |body, slots| Values::Scalar(gather(slots, &|slot| body.material.scheme(slot)))),
+    ];
 }
 
-impl<P: Precision> State<P> {
-    pub fn changing(&mut self) -> Changing<'_> {
-        Changing {
-            displacement: doubles(&self.displacement),
-            velocity: doubles(&self.velocity),
-            force: doubles_mut(&mut self.force),
-            states: &mut self.states,
-            broken: &mut self.broken,
-            tension: &mut self.tension,
+/// Computes a field at some slots.
+type FieldOf<const D: usize, P> = fn(&mut Elasticity<D, P>, &[u32]) -> Values;
+
+const fn info(name: &'static str, unit: &'static str, about: &'static str) -> FieldInfo {
+    FieldInfo { name, unit, about }
+}
+const DISPLACEMENT: FieldInfo = info("displacement", "m", "u");
+const VELOCITY: FieldInfo = info("velocity", "m/s", "its rate");
+const FORCE: FieldInfo = info("force", "N/m³", "density of all forces, loads included");
+const DAMAGE: FieldInfo = info("damage", "", "share of the family, by volume, whose bonds are broken");
+const STRAIN_ENERGY: FieldInfo = info("strain_energy", "J/m³", "density of what bonds hold");
+const SCHEME: FieldInfo = info("scheme", "", "1 where bonds are summed, 0 where points have a row");
+/// The fields of elastic bodies.
+pub const FIELDS: &[FieldInfo] = &[DISPLACEMENT, VELOCITY, FORCE, DAMAGE, STRAIN_ENERGY, SCHEME];
+
+impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
+    fn unknown(&mut self) -> Unknown<'_> {
+        let State { displacement, velocity, force, .. } = &mut self.state;
+        let damped = self.material.damped();
+        Unknown {
+            vectors: P::Field::numbers(Vectors { value: displacement, velocity, rate: force, damped }),
+            components: D,
+            inertia: self.density,
+            negligible: P::Bond::NEGLIGIBLE * self.body.cloud.spacing,
         }
     }
-}
 
-const TWO_PASSES: &str = "only state-based solids have two passes";
-const DOUBLE_ONLY: &str = "state-based solids are of double precision";
-
-pub(crate) fn doubles<F: Number>(field: &[F]) -> &[f64] {
-    F::doubles(field).expect(DOUBLE_ONLY)
-}
-
-pub(crate) fn doubles_mut<F: Number>(field: &mut [F]) -> &mut [f64] {
-    F::doubles_mut(field).expect(DOUBLE_ONLY)
-}
-
-/// Σ f
-struct Force<L>(L);
-
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, D> for Force<B> {
-    const SMALL: f64 = B::SMALL;
-    const LINEAR: bool = B::LINEAR;
-
-    #[inline(always)]
-    fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
-        self.0.strain(bond, eta)
+    fn evaluate(&mut self) {
+        let (material, mut on, state) = self.parts();
+        material.evaluate(&mut on, state);
     }
-    #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
-        self.0.force(bond, eta, strain, sum)
+
+    fn evolve(&mut self, dt: f64) {
+        let (material, mut on, state) = self.parts();
+        material.evolve(&mut on, state, dt);
     }
-    #[inline(always)]
-    fn add_small<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
-        self.0.small_force(bond, eta, strain, sum)
+
+    fn drift_and_evolve(&mut self, drift: &Drift, dt: f64) -> Option<f64> {
+        let (material, mut on, state) = self.parts();
+        material.drift_and_evolve(&mut on, state, drift, dt)
     }
-}
 
-/// ½ Σ w
-struct Energy<L>(L);
-
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, 1> for Energy<B> {
-    const SMALL: f64 = B::SMALL;
-
-    #[inline(always)]
-    fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
-        self.0.strain(bond, eta)
+    fn was_set(&mut self, component: usize, slots: &[u32]) {
+        self.material.was_set(&self.state, component, slots);
     }
-    #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; D], strain: L, [sum]: [L; 1]) -> [L; 1] {
-        [L::splat(0.5).mul_add(self.0.energy(bond, strain), sum)]
+
+    fn has_drifted(&mut self) {
+        self.material.has_drifted();
     }
-    #[inline(always)]
-    fn add_small<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; D], strain: L, [sum]: [L; 1]) -> [L; 1] {
-        [L::splat(0.5).mul_add(self.0.small_energy(bond, strain), sum)]
+
+    fn stable_step(&self) -> f64 {
+        let mut on = On {
+            body: &self.body,
+            operator: &self.operator,
+            failure: self.failure.as_ref(),
+            exec: &mut Exec::default(),
+        };
+        self.material.stable_step(&mut on, self.density)
     }
-}
 
-/// Σ k
-struct Tangent<L>(L);
-
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 1> for Tangent<B> {
-    const RELATIVE: bool = false;
-
-    #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
-        [sum + self.0.tangent(bond.length, bond.weight)]
+    fn fields(&self) -> &'static [FieldInfo] {
+        FIELDS
     }
-}
 
-/// Σ k e_d²
-struct Diagonal<L>(L);
+    fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field> {
+        let (info, compute) = Self::FIELDS.iter().find(|(info, _)| info.name == name)?;
+        let slots = self.body.cloud.slots[points].to_vec();
+        let values = compute(self, &slots);
+        Some(Field { name: info.name, unit: info.unit, values })
+    }
 
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for Diagonal<B> {
-    const RELATIVE: bool = false;
+    fn points(&self) -> &dyn Points {
+        self
+    }
 
-    #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; D]) -> [L; D] {
-        let spring = self.0.tangent(bond.length, bond.weight) * bond.inverse_square;
+    fn bonds(&self) -> &dyn super::Bonds {
+        self
+    }
+
+    fn motion(&mut self) -> (f64, [f64; 3]) {
+        let (cloud, density) = (&self.body.cloud, self.density);
+        let velocity = components::<D, _>(&self.state.velocity);
+        let (volumes, volume) = match &cloud.arrangement {
+            // Slots without a point are at rest.
+            Arrangement::Lattice(lattice) => (None, lattice.cell_volume()),
+            Arrangement::Scattered { volumes, .. } => (Some(volumes), 1.0),
+        };
+        let [square, momentum @ ..] = self.exec.sum(cloud.n_slots(), &|slots| {
+            let volumes = volumes.map(|v| &v[slots.clone()]);
+            let mut sum = [0.0; 4];
+            for d in 0..D {
+                let [square, momentum] = squares_and_sum(&velocity[d][slots.clone()], volumes);
+                sum[0] += square;
+                sum[d + 1] = momentum;
+            }
+            sum
+        });
+        let mass = density * volume;
+        (0.5 * mass * square, momentum.map(|p| mass * p))
+    }
+
+    fn motion_of(&self, squares: f64) -> Option<f64> {
+        let Arrangement::Lattice(_) = self.body.cloud.arrangement else { return None };
+        let volume = self.body.cloud.spacing.powi(D as i32);
+        Some(0.5 * self.density * volume * squares)
+    }
+
+    fn content(&mut self) -> Content {
+        let density = self.energy_density();
+        let (cloud, rho) = (&self.body.cloud, self.density);
+        let [u, v] = [&self.state.displacement, &self.state.velocity].map(|flat| components::<D, _>(flat));
+        let n = cloud.n_points();
+        let [stored, scale, ..] = self.exec.sum(n, &|points| {
+            let (mut strain, mut scale) = (0.0, 0.0);
+            for slot in cloud.stored(points) {
+                let volume = cloud.volume(slot);
+                strain += density[slot].to_f64() * volume;
+                scale += rho * volume * v.iter().map(|v| v[slot].to_f64().powi(2)).sum::<f64>().sqrt();
+            }
+            [strain, scale, 0.0, 0.0]
+        });
+        let momentum_of = |slot: usize| -> [f64; 3] {
+            let mass = rho * cloud.volume(slot);
+            embed::<D>(&std::array::from_fn(|d| mass * v[d][slot].to_f64()))
+        };
+        let angular = self.exec.sum(n, &|points| {
+            let mut sum = [0.0; 4];
+            for slot in cloud.stored(points) {
+                let x = cloud.position(slot);
+                let y = embed::<D>(&std::array::from_fn(|d| x[d] + u[d][slot].to_f64()));
+                let p = momentum_of(slot);
+                for d in 0..3 {
+                    let (a, b) = ((d + 1) % 3, (d + 2) % 3);
+                    sum[d] += y[a] * p[b] - y[b] * p[a];
+                }
+            }
+            sum
+        });
+        Content { stored, scale, angular_momentum: [angular[0], angular[1], angular[2]] }
+    }
+
+    fn broken(&self) -> Broken {
+        self.state.broken
+    }
+
+    fn dissipates(&self) -> bool {
+        self.material.dissipates()
+    }
+
+    fn dissipation(&mut self) -> Option<f64> {
+        let (material, mut on, state) = self.parts();
+        material.dissipation(&mut on, state)
+    }
+
+    fn columns(&self, b: &Balance) -> Vec<Column> {
+        let relative = if b.scale() > 0.0 { b.defect() / b.scale() } else { 0.0 };
+        let mut columns: Vec<Column> = [
+            ("kinetic", b.kinetic),
+            ("strain", b.strain),
+            ("fracture", b.fracture),
+            ("external", b.external),
+            ("damped", b.damped),
+            ("imbalance", relative),
+            ("broken_bonds", (self.state.broken.bonds / 2) as f64),
+        ]
+        .map(|(name, value)| Column::new(name, value))
+        .into();
+        let axes = ["x", "y", "z"];
+        columns.extend((0..D).map(|d| Column::new(format!("momentum_{}", axes[d]), b.momentum[d])));
+        // About z in 2D; none in 1D.
+        let turns = [0..0, 2..3, 0..3][D - 1].clone();
+        columns.extend(turns.map(|d| Column::new(format!("angular_momentum_{}", axes[d]), b.angular_momentum[d])));
+        columns
+    }
+
+    fn first_bad(&mut self) -> Option<(&'static str, f64, usize)> {
+        let State { displacement, velocity, force, .. } = &self.state;
+        let slots = &self.body.cloud.slots;
+        [("displacement", displacement), ("force density", force), ("velocity", velocity)].into_iter().find_map(
+            |(name, flat)| {
+                components::<D, _>(flat).into_iter().find_map(|component| {
+                    let bad = slots.iter().position(|&slot| !component[slot as usize].to_f64().is_finite())?;
+                    Some((name, component[slots[bad] as usize].to_f64(), bad))
+                })
+            },
+        )
+    }
+
+    fn fastest(&mut self) -> Option<usize> {
+        let (velocity, slots) = (components::<D, _>(&self.state.velocity), &self.body.cloud.slots);
+        let speed = |&slot: &u32| velocity.iter().map(|v| v[slot as usize].to_f64().powi(2)).sum::<f64>();
+        (0..slots.len()).max_by(|&a, &b| speed(&slots[a]).total_cmp(&speed(&slots[b])))
+    }
+
+    fn tangent(&mut self) -> Option<&mut dyn super::Tangent> {
+        Some(self)
+    }
+
+    fn settle(&mut self, at_rest: &[f64], force: &[f64], broken: Broken) {
+        self.state.broken.bonds += broken.bonds;
+        self.state.broken.energy += broken.energy;
+        for (u, value) in self.state.displacement.iter_mut().zip(at_rest) {
+            *u = P::Field::from_f64(*value);
+        }
+        let (cloud, n) = (&self.body.cloud, self.body.cloud.n_slots());
         for d in 0..D {
-            sum[d] = (bond.xi[d] * bond.xi[d]).mul_add(spring, sum[d]);
+            for slot in cloud.slots.iter().map(|&slot| slot as usize) {
+                self.state.force[d * n + slot] = P::Field::from_f64(force[d * n + slot] / cloud.volume(slot));
+            }
         }
-        sum
     }
-}
 
-/// One row of Σ k e eᵀ at rest.
-struct DiagonalRow<L>(L, usize);
+    fn adapt(&mut self, t: f64, thoroughly: bool) -> Option<Replaced> {
+        self.follow(t, thoroughly)
+    }
 
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for DiagonalRow<B> {
-    const RELATIVE: bool = false;
+    fn adapts_every(&self) -> Option<u64> {
+        self.adaptation.as_ref().map(|adaptation| adaptation.every)
+    }
 
-    #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; D]) -> [L; D] {
-        let spring = self.0.tangent(bond.length, bond.weight) * bond.inverse_square * bond.xi[self.1];
-        for d in 0..D {
-            sum[d] = bond.xi[d].mul_add(spring, sum[d]);
+    fn adapted(&self) -> Option<Adapted> {
+        let follows = self.adaptation.as_ref().is_some_and(|adaptation| adaptation.criteria.is_some());
+        follows.then_some(self.adapted)
+    }
+
+    fn hybrid(&self) -> Option<Work> {
+        self.material.work()
+    }
+
+    fn visit(&mut self, visitor: &mut dyn Visitor) {
+        let State { displacement, velocity, force, states, broken } = &mut self.state;
+        P::Field::visit(displacement, "displacement", visitor);
+        P::Field::visit(velocity, "velocity", visitor);
+        // The rate of the last evaluation: the next step begins with it.
+        P::Field::visit(force, "force", visitor);
+        visitor.words("bonds", states.vector());
+        visitor.count("broken_bonds", &mut broken.bonds);
+        visitor.number("fracture_energy", &mut broken.energy);
+        self.material.visit(visitor);
+        self.exec.visit(visitor);
+    }
+
+    fn hash(&mut self, hasher: &mut blake3::Hasher) {
+        for flat in [&self.state.displacement, &self.state.velocity] {
+            for component in components::<D, _>(flat) {
+                for &slot in &self.body.cloud.slots {
+                    hasher.update(component[slot as usize].bytes().as_ref());
+                }
+            }
         }
-        sum
+        hasher.update(&self.state.states.bytes());
+    }
+
+    fn memory(&self) -> usize {
+        let cloud = &self.body.cloud;
+        let fields = (3 * D + 1) * size_of::<P::Field>() * cloud.n_slots() + size_of_val(&cloud.slots[..]);
+        let classes = self.failure.as_ref().map_or(0, CriticalStretch::memory);
+        let points = match &cloud.arrangement {
+            Arrangement::Lattice(_) => 0,
+            Arrangement::Scattered { positions, volumes } => size_of_val(&positions[..]) + size_of_val(&volumes[..]),
+        };
+        let families = match &self.body.families {
+            Families::Lattice(families) => size_of_val(&families.blocks[..]),
+            // Sites in the precision of the loops, and the records of input values.
+            Families::Cloud(families) => {
+                let records = size_of_val(&families.sites.records[..]);
+                let fixed = if size_of::<P::Bond>() == 4 { records / 2 } else { 0 };
+                let input = 4 * size_of::<P::Field>() * cloud.n_slots();
+                size_of_val(&families.starts[..]) + size_of_val(&families.neighbours[..]) + records + fixed + input
+            }
+        };
+        let bonds = size_of_val(self.state.states.words()) + self.operator.memory();
+        fields + classes + points + families + bonds + self.material.memory()
     }
 }
 
-/// Σ of the weights themselves.
-struct Weight;
-
-impl<const D: usize> BondKernel<D, 0, 1> for Weight {
-    const RELATIVE: bool = false;
-
-    #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
-        [sum + bond.weight]
+impl<const D: usize, P: Packs> Points for Elasticity<D, P> {
+    fn dimension(&self) -> usize {
+        D
+    }
+    fn n_points(&self) -> usize {
+        self.body.cloud.n_points()
+    }
+    fn slots(&self) -> &[u32] {
+        &self.body.cloud.slots
+    }
+    fn n_slots(&self) -> usize {
+        self.body.cloud.n_slots()
+    }
+    fn position(&self, slot: usize) -> [f64; 3] {
+        embed(&self.body.cloud.position(slot))
+    }
+    fn volume(&self, slot: usize) -> f64 {
+        self.body.cloud.volume(slot)
+    }
+    fn same_volume(&self) -> Option<f64> {
+        match &self.body.cloud.arrangement {
+            Arrangement::Lattice(lattice) => Some(lattice.cell_volume()),
+            Arrangement::Scattered { .. } => None,
+        }
+    }
+    fn spacing(&self) -> f64 {
+        self.body.cloud.spacing
+    }
+    fn horizon(&self) -> f64 {
+        self.body.horizon
+    }
+    fn generation(&self) -> u64 {
+        self.generation
     }
 }
 
-/// Where bonds end at points with a row, which stands for unbroken bonds: such bonds do not break, and are told of.
-pub struct Edge<'a> {
-    pub regions: &'a Regions,
-    pub overstretched: Mutex<Overstretched>,
-}
-
-/// Bonds beyond their critical stretch, by the slots of both ends, in no order.
-#[derive(Debug, Default)]
-pub struct Overstretched {
-    /// Broken.
-    pub broken: Vec<u32>,
-    /// With an end that has a row, and whole.
-    pub held: Vec<u32>,
-}
-
-impl Edge<'_> {
-    /// Takes note of a bond; whether it may break.
-    fn may_break(&self, here: usize, there: usize) -> bool {
-        let free = !self.regions.has_row(here) && !self.regions.has_row(there);
-        let mut list = self.overstretched.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        let list = if free { &mut list.broken } else { &mut list.held };
-        list.extend([here as u32, there as u32]);
-        free
+impl<const D: usize, P: Packs> super::Bonds for Elasticity<D, P> {
+    fn count(&self) -> [u64; 2] {
+        [self.n_bonds, self.n_cut]
+    }
+    fn per_point(&self) -> Vec<u32> {
+        self.state.states.per_point(&self.body)
+    }
+    fn words(&self) -> &[u16] {
+        self.state.states.words()
+    }
+    fn ends(&self, bit: usize) -> [[f64; 3]; 2] {
+        self.state.states.ends(&self.body, bit).map(|slot| embed(&self.body.cloud.position(slot)))
     }
 }
 
-/// The critical stretch, and what is needed to know the energy that a broken bond takes.
-struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
-    failure: &'a CriticalStretch,
-    law: L,
-    displacement: [&'a [F]; D],
-    velocity: [&'a [F]; D],
-    dt: f64,
-    hybrid: Option<&'a Edge<'a>>,
+/// A value for each slot. Compiled for each type of value only.
+fn gather<T: Send>(slots: &[u32], value: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
+    slots.par_iter().map(|&slot| value(slot as usize)).collect()
 }
 
-impl<const D: usize, L: BondLaw<D>, F: Number> BreakRule<D> for Breaking<'_, D, L, F> {
-    fn threshold(&self) -> f64 {
-        self.law.strain_at(self.failure.smallest())
+/// Σ v² V and Σ v V; V = 1 where none is given. Eight sums side by side, so that the loop is vectors.
+fn squares_and_sum<T: Number>(values: &[T], volumes: Option<&[f64]>) -> [f64; 2] {
+    let (mut squares, mut sums) = ([0.0; 8], [0.0; 8]);
+    let mut chunks = values.chunks_exact(8);
+    match volumes {
+        None => {
+            for chunk in &mut chunks {
+                for k in 0..8 {
+                    let v = chunk[k].to_f64();
+                    squares[k] += v * v;
+                    sums[k] += v;
+                }
+            }
+            for (k, v) in chunks.remainder().iter().enumerate() {
+                squares[k] += v.to_f64() * v.to_f64();
+                sums[k] += v.to_f64();
+            }
+        }
+        Some(volumes) => {
+            for (k, (v, volume)) in values.iter().zip(volumes).enumerate() {
+                let v = v.to_f64();
+                squares[k % 8] += v * v * volume;
+                sums[k % 8] += v * volume;
+            }
+        }
     }
-
-    fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
-        strain > self.law.strain_at(self.failure.of(here, there))
-            && self.hybrid.is_none_or(|edge| edge.may_break(here, there))
-    }
-
-    /// Half of w(η) + ½ f(η)·Δη, with η at the start of the step in which the bond breaks and Δη its change in the
-    /// step: what the bond held, and what it still took from the motion, since velocity Verlet kicks with its force at
-    /// the start of the step and no longer with that at the end. So the books balance whatever the step.
-    fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
-        let difference = |f: &[&[F]; D], d: usize| f[d][there].to_f64() - f[d][here].to_f64();
-        let change: [f64; D] = std::array::from_fn(|d| self.dt * difference(&self.velocity, d));
-        let before: [f64; D] = std::array::from_fn(|d| difference(&self.displacement, d) - change[d]);
-        let strain = self.law.strain(bond, &before);
-        let force = self.law.force(bond, &before, strain, [0.0; D]);
-        0.5 * (self.law.energy(bond, strain) + 0.5 * dot(&force, &change))
-    }
+    [squares, sums].map(|[a, b, c, d, e, f, g, h]| ((a + e) + (c + g)) + ((b + f) + (d + h)))
 }

@@ -8,11 +8,12 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::Elasticity;
-use super::state_based::Moduli;
+use super::kernels::bonded_volume;
+use super::linear_solid::Moduli;
+use super::material::{Material, On};
 use crate::discretization::{Correction, Scaling};
-use crate::execution::Exec;
-use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates};
+use crate::execution::Packs;
+use crate::family::{Bond, BondKernel, BondLaw, BondStates};
 use crate::field::Double;
 use crate::lane::Lane;
 
@@ -32,113 +33,119 @@ const AFFECTED: f64 = 0.01;
 
 /// By slot: Σ k ξ_d⁴/|ξ|² along each axis and Σ k |ξ|² behind, four times the energy densities of unit strain, over the same
 /// of a complete family. Where axes are fewer than three, the others are not numbers.
-type Shares = [Vec<f64>; 4];
+pub type Shares = [Vec<f64>; 4];
 
-impl<L> Elasticity<L> {
-    /// How complete the families of a body are. `scaling`: what its weights come from.
-    pub fn surface_effect<const D: usize>(&self, body: &Body<D>, scaling: &Scaling) -> SurfaceEffect
-    where
-        L: BondLaw<D>,
-    {
-        let shares = self.shares(body, scaling);
-        let cloud = &body.cloud;
-        let (mut affected, mut softest, mut energy, mut complete) = (0, f64::INFINITY, 0.0, 0.0);
-        for slot in cloud.stored(0..cloud.n_points()) {
-            let along = || shares[..D].iter().chain(&shares[3..]).map(|share| share[slot]);
-            affected += usize::from(along().any(|share| (share - 1.0).abs() > AFFECTED));
-            softest = along().fold(softest, f64::min);
-            energy += shares[3][slot] * cloud.volume(slot);
-            complete += cloud.volume(slot);
-        }
-        let points_affected = affected as f64 / cloud.n_points() as f64;
-        SurfaceEffect { points_affected, softest, mean_deficit: 1.0 - energy / complete }
+/// How complete the families of a body are. `scaling`: what its weights come from.
+pub fn surface_effect<const D: usize, P: Packs>(
+    material: &dyn Material<D, P>,
+    on: &mut On<'_, D>,
+    scaling: &Scaling,
+) -> SurfaceEffect {
+    let shares = material.shares(on, scaling);
+    let cloud = &on.body.cloud;
+    let (mut affected, mut softest, mut energy, mut complete) = (0, f64::INFINITY, 0.0, 0.0);
+    for slot in cloud.stored(0..cloud.n_points()) {
+        let along = || shares[..D].iter().chain(&shares[3..]).map(|share| share[slot]);
+        affected += usize::from(along().any(|share| (share - 1.0).abs() > AFFECTED));
+        softest = along().fold(softest, f64::min);
+        energy += shares[3][slot] * cloud.volume(slot);
+        complete += cloud.volume(slot);
     }
-
-    /// The energy method's correction of this body.
-    pub fn correction_by_energy<const D: usize>(&self, body: &Body<D>, scaling: &Scaling) -> Correction<D>
-    where
-        L: BondLaw<D>,
-    {
-        let shares = self.shares(body, scaling);
-        let factors = |slot: usize| std::array::from_fn(|d| 1.0 / shares[d][slot]);
-        Correction::Energy((0..body.cloud.n_slots()).map(factors).collect())
-    }
-
-    /// The volume method's correction of this body, which has one horizon.
-    pub fn correction_by_volume<const D: usize>(&self, body: &Body<D>, scaling: &Scaling) -> Correction<D> {
-        let mut shares = vec![0.0; body.cloud.n_slots()];
-        self.bonded_volume(body, &mut Exec::default(), &BondStates::whole(body), &mut shares);
-        let mut complete = 0.0;
-        scaling.complete::<D>(body.cloud.spacing, body.horizon, |_, volume| complete += volume);
-        shares.iter_mut().for_each(|share| *share /= complete);
-        Correction::Volume(shares)
-    }
-
-    fn shares<const D: usize>(&self, body: &Body<D>, scaling: &Scaling) -> Shares
-    where
-        L: BondLaw<D>,
-    {
-        let mut shares: Shares = std::array::from_fn(|_| vec![0.0; body.cloud.n_slots()]);
-        let (weights, whole, kernel) = (&self.operator.weights, BondStates::whole(body), UnitStrain(self.law));
-        let output = shares.each_mut().map(|share| &mut share[..]);
-        Exec::default().sum_bonds::<D, 0, 4, Double>(body, weights, &whole, [], output, &kernel);
-        if let Some(solid) = &self.state_based {
-            self.shares_of_solid(&solid.moduli, body, scaling, &mut shares);
-            return shares;
-        }
-        let complete = |size, horizon| {
-            let mut sum = [0.0; 4];
-            scaling.complete::<D>(size, horizon, |bond, _| sum = kernel.add(bond, &[], 0.0, sum));
-            sum
-        };
-        match &body.grading {
-            None => {
-                let complete = complete(body.cloud.spacing, body.horizon);
-                for (share, complete) in shares.iter_mut().zip(complete) {
-                    share.iter_mut().for_each(|share| *share /= complete);
-                }
-            }
-            Some(grading) => {
-                // Micromoduli scale so that the ratio δ/Δx alone matters.
-                let mut known = BTreeMap::new();
-                for (slot, (&size, &horizon)) in grading.sizes.iter().zip(&grading.horizons).enumerate() {
-                    let ratio: f64 = horizon / size;
-                    let complete = known.entry(ratio.to_bits()).or_insert_with(|| complete(size, horizon));
-                    for (share, complete) in shares.iter_mut().zip(complete) {
-                        share[slot] /= *complete;
-                    }
-                }
-            }
-        }
-        shares
-    }
+    let points_affected = affected as f64 / cloud.n_points() as f64;
+    SurfaceEffect { points_affected, softest, mean_deficit: 1.0 - energy / complete }
 }
 
-impl<L> Elasticity<L> {
-    /// From the sums of the energies of bonds to shares, of a body whose points have a weighted volume of their own. Unit
-    /// strain in all directions has the energy of a complete family everywhere.
-    fn shares_of_solid<const D: usize>(&self, moduli: &Moduli, body: &Body<D>, scaling: &Scaling, shares: &mut Shares)
-    where
-        L: BondLaw<D>,
-    {
-        let mut squares: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; body.cloud.n_slots()]);
-        let (weights, whole, kernel) = (&self.operator.weights, BondStates::whole(body), Squares(self.law));
-        let output = squares.each_mut().map(|sum| &mut sum[..]);
-        Exec::default().sum_bonds::<D, 0, 3, Double>(body, weights, &whole, [], output, &kernel);
-        let (mut energies, mut sums) = ([0.0; 4], [0.0; 3]);
-        scaling.complete::<D>(body.cloud.spacing, body.horizon, |bond, _| {
-            energies = UnitStrain(self.law).add(bond, &[], 0.0, energies);
-            sums = kernel.add(bond, &[], 0.0, sums);
-        });
-        let [axes @ .., moments] = shares;
-        for d in 0..D {
-            let complete = moduli.energy(energies[3], sums[d], energies[d]);
-            for (slot, share) in axes[d].iter_mut().enumerate().filter(|(slot, _)| moments[*slot] > 0.0) {
-                *share = moduli.energy(moments[slot], squares[d][slot], *share) / complete;
+/// The energy method's correction of a body.
+pub fn correction_by_energy<const D: usize, P: Packs>(
+    material: &dyn Material<D, P>,
+    on: &mut On<'_, D>,
+    scaling: &Scaling,
+) -> Correction<D> {
+    let shares = material.shares(on, scaling);
+    let factors = |slot: usize| std::array::from_fn(|d| 1.0 / shares[d][slot]);
+    Correction::Energy((0..on.body.cloud.n_slots()).map(factors).collect())
+}
+
+/// The volume method's correction of a body that has one horizon.
+pub fn correction_by_volume<const D: usize>(on: &mut On<'_, D>, scaling: &Scaling) -> Correction<D> {
+    let body = on.body;
+    let mut shares = vec![0.0; body.cloud.n_slots()];
+    bonded_volume(on.exec, body, &on.operator.volumes, &BondStates::whole(body), &mut shares);
+    let mut complete = 0.0;
+    scaling.complete::<D>(body.cloud.spacing, body.horizon, |_, volume| complete += volume);
+    shares.iter_mut().for_each(|share| *share /= complete);
+    Correction::Volume(shares)
+}
+
+/// The sums of the energies of bonds, not yet over those of a complete family.
+fn energies<const D: usize, L: BondLaw<D>>(law: L, on: &mut On<'_, D>) -> Shares {
+    let body = on.body;
+    let mut sums: Shares = std::array::from_fn(|_| vec![0.0; body.cloud.n_slots()]);
+    let (weights, whole, kernel) = (&on.operator.weights, BondStates::whole(body), UnitStrain(law));
+    let output = sums.each_mut().map(|sum| &mut sum[..]);
+    on.exec.sum_bonds::<D, 0, 4, Double>(body, weights, &whole, [], output, &kernel);
+    sums
+}
+
+/// [`Shares`] of a material of bonds.
+pub(super) fn shares_of_bonds<const D: usize, L: BondLaw<D>>(law: L, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
+    let mut shares = energies(law, on);
+    let (body, kernel) = (on.body, UnitStrain(law));
+    let complete = |size, horizon| {
+        let mut sum = [0.0; 4];
+        scaling.complete::<D>(size, horizon, |bond, _| sum = kernel.add(bond, &[], &[], 0.0, sum));
+        sum
+    };
+    match &body.grading {
+        None => {
+            let complete = complete(body.cloud.spacing, body.horizon);
+            for (share, complete) in shares.iter_mut().zip(complete) {
+                share.iter_mut().for_each(|share| *share /= complete);
             }
         }
-        moments.iter_mut().for_each(|moment| *moment = if *moment > 0.0 { 1.0 } else { 0.0 });
+        Some(grading) => {
+            // Micromoduli scale so that the ratio δ/Δx alone matters.
+            let mut known = BTreeMap::new();
+            for (slot, (&size, &horizon)) in grading.sizes.iter().zip(&grading.horizons).enumerate() {
+                let ratio: f64 = horizon / size;
+                let complete = known.entry(ratio.to_bits()).or_insert_with(|| complete(size, horizon));
+                for (share, complete) in shares.iter_mut().zip(complete) {
+                    share[slot] /= *complete;
+                }
+            }
+        }
     }
+    shares
+}
+
+/// [`Shares`] of a body whose points have a weighted volume of their own, from the sums of the energies of bonds. Unit
+/// strain in all directions has the energy of a complete family everywhere.
+pub(super) fn shares_of_solid<const D: usize, L: BondLaw<D>>(
+    law: L,
+    moduli: &Moduli,
+    on: &mut On<'_, D>,
+    scaling: &Scaling,
+) -> Shares {
+    let mut shares = energies(law, on);
+    let body = on.body;
+    let mut squares: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; body.cloud.n_slots()]);
+    let (weights, whole, kernel) = (&on.operator.weights, BondStates::whole(body), Squares(law));
+    let output = squares.each_mut().map(|sum| &mut sum[..]);
+    on.exec.sum_bonds::<D, 0, 3, Double>(body, weights, &whole, [], output, &kernel);
+    let (mut energies, mut sums) = ([0.0; 4], [0.0; 3]);
+    scaling.complete::<D>(body.cloud.spacing, body.horizon, |bond, _| {
+        energies = UnitStrain(law).add(bond, &[], &[], 0.0, energies);
+        sums = kernel.add(bond, &[], &[], 0.0, sums);
+    });
+    let [axes @ .., moments] = &mut shares;
+    for d in 0..D {
+        let complete = moduli.energy(energies[3], sums[d], energies[d]);
+        for (slot, share) in axes[d].iter_mut().enumerate().filter(|(slot, _)| moments[*slot] > 0.0) {
+            *share = moduli.energy(moments[slot], squares[d][slot], *share) / complete;
+        }
+    }
+    moments.iter_mut().for_each(|moment| *moment = if *moment > 0.0 { 1.0 } else { 0.0 });
+    shares
 }
 
 /// Σ k ξ_d²
@@ -148,7 +155,7 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 3> for Squares<B> {
     const RELATIVE: bool = false;
 
     #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; 3]) -> [L; 3] {
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: &[L; 0], _: L, mut sum: [L; 3]) -> [L; 3] {
         let spring = self.0.tangent(bond.length, bond.weight);
         for d in 0..D {
             sum[d] = (bond.xi[d] * bond.xi[d]).mul_add(spring, sum[d]);
@@ -164,7 +171,7 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 4> for UnitStrain<B> {
     const RELATIVE: bool = false;
 
     #[inline(always)]
-    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: L, mut sum: [L; 4]) -> [L; 4] {
+    fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: &[L; 0], _: L, mut sum: [L; 4]) -> [L; 4] {
         let spring = self.0.tangent(bond.length, bond.weight);
         for d in 0..D {
             let square = bond.xi[d] * bond.xi[d];

@@ -39,7 +39,7 @@ impl Exec {
     ///
     /// # Panics
     /// If the body is no lattice, or a vector has not the length of the cloud.
-    pub fn collocate_behind<const D: usize, P: Packs>(
+    pub fn collocate_fused<const D: usize, P: Packs>(
         &mut self,
         body: &Body<D>,
         row: &SharedRow<D>,
@@ -72,7 +72,7 @@ impl Exec {
         };
         let sum = Sum::<D, P>::new(self.instructions, body, regions, ahead, &f, limits).of(row);
         // SAFETY: as of `collocate`, and what a row reads has been made.
-        sum.each_behind(&make, |slot| unsafe { sum.force(slot) })
+        sum.each_fused(&make, |slot| unsafe { sum.force(slot) })
     }
 }
 
@@ -80,7 +80,7 @@ impl<const D: usize, P: Packs> Sum<'_, D, P> {
     /// As [`each`](Self::each) over all blocks with a row, but `make` is called for all slots, slab by slab, and work on a
     /// block is done once all is made that its row reaches. Where blocks are not in the order of slots, as in the tiles of 3D,
     /// that is when all is made.
-    fn each_behind(
+    fn each_fused(
         &self,
         make: &(impl Fn(Range<usize>) -> f64 + Sync),
         work: impl Fn(usize) -> u16 + Sync,

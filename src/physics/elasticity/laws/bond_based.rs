@@ -80,7 +80,7 @@ impl<const D: usize> BondLaw<D> for BondBased {
 }
 
 /// (1 − 1/√(1 + q))/q on |q| ≤ 0.01: interpolated at the zeros of the Chebyshev polynomial T₇, relative error 6e-17.
-pub(super) const FORCE: [f64; 7] = [
+pub(crate) const FORCE: [f64; 7] = [
     0.5,
     -0.3750000000000215,
     0.31250000000002026,
@@ -93,7 +93,7 @@ pub(super) const FORCE: [f64; 7] = [
 const FORCE_SINGLE: [f64; 4] = [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 128.0];
 
 /// (√(1 + q) − 1)/q on |q| ≤ 0.01, as [`FORCE`]: relative error 4e-18.
-pub(super) const STRETCH: [f64; 7] = [
+pub(crate) const STRETCH: [f64; 7] = [
     0.5,
     -0.12500000000000144,
     0.0625000000000012,

@@ -1,30 +1,25 @@
 //! The event loop: step, look, write, until the end. The first file to read.
 
+mod model;
+
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::Instant;
 
-use rayon::prelude::*;
+pub use model::Model;
 
-use crate::conditions::prescribed::Prescribed;
 use crate::error::{Error, Result};
-use crate::execution::Packs;
-use crate::family::BondLaw;
-use crate::field::{Double, Field, Precision, embed};
-use crate::geometry::Arrangement;
 use crate::output::history::History;
 use crate::output::report::{Energy, Hybrid, Refinement, Report, Tip, WallSeconds, peak_memory};
 use crate::output::snapshot::Look;
-use crate::output::source::{Facts, Points, Source};
+use crate::output::source::{Points, Source};
 use crate::output::writer::{Order, Output};
 use crate::output::writer_thread::{Batch, WriterThread};
-use crate::problem::hybrid::Work;
-use crate::problem::{Adapted, Balance, Problem};
 use crate::solver::statics::LoadStep;
 use crate::solver::{Clock, Solver};
 
-/// A model that can be stepped and looked at: a [`Problem`] whose dimension and law are no longer types.
+/// A model that can be stepped and looked at: a [`Model`], or what stands for one.
 pub trait Stepper: Source + Send {
     fn start(&mut self);
     /// Takes a step. Within a load step of a static solver, `observe` is told iterations and relative imbalance, and
@@ -174,7 +169,7 @@ impl Simulation {
         let begin = Instant::now();
         let outputs = std::mem::take(&mut self.outputs).into_iter().map(Output::split);
         let (orders, writers): (Vec<_>, Vec<_>) = outputs.unzip();
-        let history = self.history.table(&*self.model);
+        let history = self.history.table(&mut *self.model);
         let thread = WriterThread::start(history, writers, self.threads, &self.folder)?;
         Ok(Desk { orders, points: None, thread, seconds: begin.elapsed().as_secs_f64() })
     }
@@ -331,128 +326,17 @@ pub fn prepare_folder(folder: &Path, overwrite: bool) -> Result<()> {
         .map_err(|e| Error::Refused(format!("{}: the folder for the results cannot be made: {e}", folder.display())))
 }
 
-/// A problem together with what its writers ask for again and again.
-pub struct Model<const D: usize, L, P: Precision = Double> {
-    pub problem: Problem<D, L, P>,
-    facts: Facts,
-    /// Made when a writer first asks, and again when points have been replaced.
-    points: OnceLock<Arc<Points>>,
-    generation: u64,
-}
-
-impl<const D: usize, L: BondLaw<D>, P: Packs> Model<D, L, P> {
-    /// `facts` as far as the case knows them; counts and sizes are filled in from the problem.
-    pub fn new(problem: Problem<D, L, P>, facts: Facts) -> Self {
-        let cloud = &problem.body.cloud;
-        let facts = Facts { dimension: D, horizon: problem.body.horizon, spacing: cloud.spacing, ..facts };
-        let mut model = Model { problem, facts, points: OnceLock::new(), generation: 0 };
-        model.count();
-        model
-    }
-
-    /// Takes note of the points as they are now.
-    fn count(&mut self) {
-        let problem = &self.problem;
-        self.facts.points = problem.body.cloud.n_points();
-        (self.facts.bonds, self.facts.cut_bonds) = (problem.n_bonds, problem.n_cut);
-        self.facts.memory = problem.memory() as u64;
-        self.generation = problem.generation;
-        self.points = OnceLock::new();
-    }
-}
-
-impl<const D: usize, L: BondLaw<D>, P: Packs> Source for Model<D, L, P> {
-    fn facts(&self) -> &Facts {
-        &self.facts
-    }
-    fn points(&self) -> &Arc<Points> {
-        self.points.get_or_init(|| {
-            let cloud = &self.problem.body.cloud;
-            let positions = cloud.slots.par_iter().map(|&s| embed(&cloud.position(s as usize))).collect();
-            let sizes = match &cloud.arrangement {
-                Arrangement::Lattice(_) => Vec::new(),
-                Arrangement::Scattered { volumes, .. } => {
-                    cloud.slots.iter().map(|&s| volumes[s as usize].powf(1.0 / D as f64)).collect()
-                }
-            };
-            Arc::new(Points { positions, sizes, facts: self.facts.clone() })
-        })
-    }
-    fn field(&mut self, name: &str) -> Option<Field> {
-        self.problem.field(name)
-    }
-    fn field_at(&mut self, name: &str, point: usize) -> Option<Field> {
-        self.problem.field_at(name, point)
-    }
-    fn balance(&mut self) -> Balance {
-        self.problem.balance()
-    }
-    fn broken_pairs(&self) -> u64 {
-        self.problem.broken_pairs()
-    }
-    fn reactions(&self) -> Vec<(String, f64)> {
-        self.problem.prescribed.iter().map(|p: &Prescribed| (p.name.clone(), p.reaction)).collect()
-    }
-    fn adapted(&self) -> Option<Adapted> {
-        self.problem.is_adapting().then_some(self.problem.adapted)
-    }
-    fn hybrid(&self) -> Option<Work> {
-        self.problem.hybrid()
-    }
-    fn hash(&mut self) -> String {
-        self.problem.hash()
-    }
-    fn family_sizes(&self) -> Vec<u32> {
-        self.problem.state.states.per_point(&self.problem.body)
-    }
-    fn bond_words(&self) -> &[u16] {
-        self.problem.state.states.words()
-    }
-    fn bond_ends(&self, bit: usize) -> [[f64; 3]; 2] {
-        let Problem { body, state, .. } = &self.problem;
-        state.states.ends(body, bit).map(|slot| embed(&body.cloud.position(slot)))
-    }
-}
-
-impl<const D: usize, L: BondLaw<D>, P: Packs> Stepper for Model<D, L, P> {
-    fn start(&mut self) {
-        self.problem.start();
-        if self.generation != self.problem.generation {
-            self.count();
-        }
-    }
-    fn step_observed(
-        &mut self,
-        solver: &Solver,
-        clock: &mut Clock,
-        observe: &mut dyn FnMut(usize, f64) -> bool,
-    ) -> Result<bool> {
-        let done = self.problem.step(solver, clock, observe);
-        if self.generation != self.problem.generation {
-            self.count();
-        }
-        done
-    }
-    fn hand_over(&mut self, solver: &Solver, t: f64) {
-        self.problem.hand_over(solver, t);
-    }
-    fn conclude(&mut self, solver: &Solver, clock: &Clock) -> Result<()> {
-        self.problem.conclude(solver, clock)
-    }
-    fn load_steps(&self) -> &[LoadStep] {
-        &self.problem.load_steps
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::error::NumericalStop;
-    use crate::field::Values;
+    use crate::field::{Field, Values};
     use crate::output::schedule::Schedule;
     use crate::output::snapshot::{Snapshot, Wants};
+    use crate::output::source::Facts;
     use crate::output::writer::Writer;
     use crate::physics::elasticity::surface::SurfaceEffect;
+    use crate::physics::{Balance, Column};
     use crate::solver::VelocityVerlet;
     use std::sync::Mutex;
 
@@ -480,6 +364,9 @@ mod tests {
         }
         fn balance(&mut self) -> Balance {
             Balance::default()
+        }
+        fn columns(&mut self, _: &Balance) -> Vec<Column> {
+            vec![Column::new("kinetic", 0.0)]
         }
         fn broken_pairs(&self) -> u64 {
             0

@@ -1,0 +1,175 @@
+//! Bond-based bodies: each bond is a spring of its own, by any [`BondLaw`].
+//!
+//! f = Σ μ f(ξ, η) β V′; Shojaei et al. 2022, eq. (26). One pass over the bonds, in which those that overstretch break first.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::State;
+use super::kernels::{Diagonal, DiagonalRow, Energy, Force, Tangent};
+use super::material::{Edge, Material, On};
+use super::surface::{Shares, shares_of_bonds};
+use crate::discretization::{BondWeights, Scaling};
+use crate::execution::{BlockRow, BreakRule, Broken, Exec, Packs};
+use crate::family::{Body, Bond, BondLaw, BondStates, Families};
+use crate::field::{Double, Number, components, components_mut, dot};
+use crate::physics::failure::CriticalStretch;
+
+/// A material of bonds alone.
+#[derive(Debug, Clone)]
+pub struct Bonds<L>(pub L);
+
+impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L> {
+    fn is_linear(&self) -> bool {
+        L::LINEAR
+    }
+
+    /// Δt = √(2ρ / max Σ k β V′), k the spring constant of a bond.
+    ///
+    /// Silling & Askari (2005), by a Gershgorin bound on the spectral radius: never too large for a linear body, and
+    /// for stretches far below one not too large for a nonlinear one either.
+    fn stable_step(&self, on: &mut On<'_, D>, density: f64) -> f64 {
+        let stiffest = match (&on.body.families, &on.operator.weights) {
+            (Families::Lattice(families), BondWeights::Lattice(weights)) => {
+                families.offsets.iter().zip(weights).map(|(o, w)| self.0.tangent(o.length, *w)).sum::<f64>()
+            }
+            (_, weights) => {
+                let mut spring = vec![0.0; on.body.cloud.n_slots()];
+                let (whole, kernel) = (BondStates::whole(on.body), Tangent(self.0));
+                on.exec.sum_bonds::<D, 0, 1, Double>(on.body, weights, &whole, [], [&mut spring], &kernel);
+                spring.into_iter().fold(0.0, f64::max)
+            }
+        };
+        (2.0 * density / stiffest).sqrt()
+    }
+
+    fn first_pass(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>, edge: Option<&Edge<'_>>) {
+        let (input, output) = (components::<D, _>(&state.displacement), components_mut::<D, _>(&mut state.force));
+        let (weights, kernel) = (&on.operator.weights, Force(self.0));
+        let (Some(failure), Some(dt)) = (on.failure, step) else {
+            return on.exec.sum_bonds::<D, D, D, P>(on.body, weights, &state.states, input, output, &kernel);
+        };
+        let velocity = components::<D, _>(&state.velocity);
+        let rule = Breaking::<D, L, P::Field> { failure, law: self.0, displacement: input, velocity, dt, edge };
+        let states = &mut state.states;
+        let now = on.exec.sum_bonds_and_break::<D, D, D, P>(on.body, weights, states, input, output, &kernel, &rule);
+        state.broken.bonds += now.bonds;
+        state.broken.energy += now.energy;
+    }
+
+    fn force_in_double(&self, on: &mut On<'_, D>, states: &BondStates, u: [&[f64]; D], force: [&mut [f64]; D]) {
+        on.exec.sum_bonds::<D, D, D, Double>(on.body, &on.operator.weights, states, u, force, &Force(self.0));
+    }
+
+    /// W = ½ Σ w β V′; eq. (9).
+    fn energy_density(&self, on: &mut On<'_, D>, states: &BondStates, u: [&[P::Field]; D], density: &mut [P::Field]) {
+        on.exec.sum_bonds::<D, D, 1, P>(on.body, &on.operator.weights, states, u, [density], &Energy(self.0));
+    }
+
+    /// Σ k e_d² β V′ with e = ξ/|ξ|.
+    fn diagonal(&self, on: &mut On<'_, D>, states: &BondStates, diagonal: [&mut [f64]; D]) {
+        let (weights, kernel) = (&on.operator.weights, Diagonal(self.0));
+        on.exec.sum_bonds::<D, 0, D, Double>(on.body, weights, states, [], diagonal, &kernel);
+    }
+
+    /// Σ e_row e_d k β V′ over whole bonds.
+    fn diagonal_row(&self, row: usize, on: &mut On<'_, D>, states: &BondStates, sums: [&mut [f64]; D]) -> bool {
+        let (weights, kernel) = (&on.operator.weights, DiagonalRow(self.0, row));
+        on.exec.sum_bonds::<D, 0, D, Double>(on.body, weights, states, [], sums, &kernel);
+        true
+    }
+
+    fn stiffness(
+        &self,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &BondStates,
+        u: [&[f64]; D],
+    ) -> Option<Vec<BlockRow<D>>> {
+        let law = self.0;
+        Some(Exec::blocks(body, weights, states, u, |bond, eta| law.stiffness(bond, eta)))
+    }
+
+    fn break_beyond(
+        &self,
+        on: &mut On<'_, D>,
+        states: &mut BondStates,
+        u: [&[f64]; D],
+        force: [&mut [f64]; D],
+        limit: f64,
+        largest: &AtomicU64,
+    ) -> Broken {
+        let Some(failure) = on.failure else { return Broken::default() };
+        let rule = Overstrained { failure, law: self.0, displacement: u, limit, largest };
+        let (weights, kernel) = (&on.operator.weights, Force(self.0));
+        on.exec.sum_bonds_and_break::<D, D, D, Double>(on.body, weights, states, u, force, &kernel, &rule)
+    }
+
+    fn strain_ratio(&self, bond: &Bond<D, f64>, eta: &[f64; D], critical: f64) -> f64 {
+        self.0.strain(bond, eta) / self.0.strain_at(critical)
+    }
+
+    fn shares(&self, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
+        shares_of_bonds(self.0, on, scaling)
+    }
+}
+
+/// The critical stretch, and what is needed to know the energy that a broken bond takes.
+struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
+    failure: &'a CriticalStretch,
+    law: L,
+    displacement: [&'a [F]; D],
+    velocity: [&'a [F]; D],
+    dt: f64,
+    edge: Option<&'a Edge<'a>>,
+}
+
+impl<const D: usize, L: BondLaw<D>, F: Number> BreakRule<D> for Breaking<'_, D, L, F> {
+    fn threshold(&self) -> f64 {
+        self.law.strain_at(self.failure.smallest())
+    }
+
+    fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
+        strain > self.law.strain_at(self.failure.of(here, there))
+            && self.edge.is_none_or(|edge| edge.may_break(here, there))
+    }
+
+    /// Half of w(η) + ½ f(η)·Δη, with η at the start of the step in which the bond breaks and Δη its change in the
+    /// step: what the bond held, and what it still took from the motion, since velocity Verlet kicks with its force at
+    /// the start of the step and no longer with that at the end. So the books balance whatever the step.
+    fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
+        let difference = |f: &[&[F]; D], d: usize| f[d][there].to_f64() - f[d][here].to_f64();
+        let change: [f64; D] = std::array::from_fn(|d| self.dt * difference(&self.velocity, d));
+        let before: [f64; D] = std::array::from_fn(|d| difference(&self.displacement, d) - change[d]);
+        let strain = self.law.strain(bond, &before);
+        let force = self.law.force(bond, &before, strain, [0.0; D]);
+        0.5 * (self.law.energy(bond, strain) + 0.5 * dot(&force, &change))
+    }
+}
+
+/// Bonds of a body at rest whose strain passes `limit` times the critical one.
+struct Overstrained<'a, const D: usize, L> {
+    failure: &'a CriticalStretch,
+    law: L,
+    displacement: [&'a [f64]; D],
+    limit: f64,
+    /// Bits of the largest strain over the critical one: those of positive numbers ascend with them.
+    largest: &'a AtomicU64,
+}
+
+impl<const D: usize, L: BondLaw<D>> BreakRule<D> for Overstrained<'_, D, L> {
+    fn threshold(&self) -> f64 {
+        self.law.strain_at(self.failure.smallest())
+    }
+
+    fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
+        let ratio = strain / self.law.strain_at(self.failure.of(here, there));
+        self.largest.fetch_max(ratio.to_bits(), Ordering::Relaxed);
+        ratio > self.limit
+    }
+
+    /// Half of what the bond holds.
+    fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
+        let eta = std::array::from_fn(|d| self.displacement[d][there] - self.displacement[d][here]);
+        0.5 * self.law.energy(bond, self.law.strain(bond, &eta))
+    }
+}

@@ -1,0 +1,128 @@
+//! A problem together with what its writers ask for again and again.
+
+use std::sync::{Arc, OnceLock};
+
+use super::Stepper;
+use crate::error::Result;
+use crate::field::Field;
+use crate::output::source::{Facts, Points, Source};
+use crate::physics::elasticity::Work;
+use crate::physics::{Adapted, Balance, Column};
+use crate::problem::Problem;
+use crate::solver::statics::LoadStep;
+use crate::solver::{Clock, Solver};
+
+/// A problem, and facts and points of it that are shared with writers.
+pub struct Model {
+    pub problem: Problem,
+    facts: Facts,
+    /// Made when a writer first asks, and again when points have been replaced.
+    points: OnceLock<Arc<Points>>,
+    generation: u64,
+}
+
+impl Model {
+    /// `facts` as far as the case knows them; counts and sizes are filled in from the problem.
+    pub fn new(problem: Problem, facts: Facts) -> Self {
+        let points = problem.points();
+        let (dimension, horizon, spacing) = (points.dimension(), points.horizon(), points.spacing());
+        let facts = Facts { dimension, horizon, spacing, ..facts };
+        let mut model = Model { problem, facts, points: OnceLock::new(), generation: 0 };
+        model.count();
+        model
+    }
+
+    /// Takes note of the points as they are now.
+    fn count(&mut self) {
+        let physics = &self.problem.physics;
+        self.facts.points = physics.points().n_points();
+        [self.facts.bonds, self.facts.cut_bonds] = physics.bonds().count();
+        self.facts.memory = physics.memory() as u64;
+        self.generation = physics.points().generation();
+        self.points = OnceLock::new();
+    }
+
+    fn follow_points(&mut self) {
+        if self.generation != self.problem.points().generation() {
+            self.count();
+        }
+    }
+}
+
+impl Source for Model {
+    fn facts(&self) -> &Facts {
+        &self.facts
+    }
+    fn points(&self) -> &Arc<Points> {
+        self.points.get_or_init(|| {
+            let points = self.problem.points();
+            let slots = points.slots();
+            let positions = slots.iter().map(|&slot| points.position(slot as usize)).collect();
+            let size = |&slot: &u32| points.volume(slot as usize).powf(1.0 / points.dimension() as f64);
+            let sizes = if points.same_volume().is_some() { Vec::new() } else { slots.iter().map(size).collect() };
+            Arc::new(Points { positions, sizes, facts: self.facts.clone() })
+        })
+    }
+    fn field(&mut self, name: &str) -> Option<Field> {
+        self.problem.field(name)
+    }
+    fn field_at(&mut self, name: &str, point: usize) -> Option<Field> {
+        self.problem.field_at(name, point)
+    }
+    fn balance(&mut self) -> Balance {
+        self.problem.balance()
+    }
+    fn columns(&mut self, balance: &Balance) -> Vec<Column> {
+        self.problem.physics.columns(balance)
+    }
+    fn broken_pairs(&self) -> u64 {
+        self.problem.broken_pairs()
+    }
+    fn reactions(&self) -> Vec<(String, f64)> {
+        self.problem.constraints.iter().map(|c| (c.name().to_string(), c.reaction())).collect()
+    }
+    fn adapted(&self) -> Option<Adapted> {
+        self.problem.physics.adapted()
+    }
+    fn hybrid(&self) -> Option<Work> {
+        self.problem.physics.hybrid()
+    }
+    fn hash(&mut self) -> String {
+        self.problem.hash()
+    }
+    fn family_sizes(&self) -> Vec<u32> {
+        self.problem.physics.bonds().per_point()
+    }
+    fn bond_words(&self) -> &[u16] {
+        self.problem.physics.bonds().words()
+    }
+    fn bond_ends(&self, bit: usize) -> [[f64; 3]; 2] {
+        self.problem.physics.bonds().ends(bit)
+    }
+}
+
+impl Stepper for Model {
+    fn start(&mut self) {
+        self.problem.start();
+        self.follow_points();
+    }
+    fn step_observed(
+        &mut self,
+        solver: &Solver,
+        clock: &mut Clock,
+        observe: &mut dyn FnMut(usize, f64) -> bool,
+    ) -> Result<bool> {
+        let done = self.problem.step(solver, clock, observe);
+        self.follow_points();
+        done
+    }
+    fn hand_over(&mut self, solver: &Solver, t: f64) {
+        self.problem.hand_over(solver, t);
+    }
+    fn conclude(&mut self, solver: &Solver, clock: &Clock) -> Result<()> {
+        self.problem.conclude(solver, clock)
+    }
+    fn load_steps(&self) -> &[LoadStep] {
+        &self.problem.load_steps
+    }
+}
