@@ -100,6 +100,26 @@ fn fused_operations_belong_to_lanes_and_no_parallel_float_sum() {
 }
 
 #[test]
+fn packages_beside_the_library_know_nothing_of_it_and_are_safe_and_silent() {
+    for package in ["linear", "picture"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(package);
+        let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        let (_, dependencies) = manifest.split_once("dependencies]").unwrap();
+        assert!(!dependencies.contains("bondwise"), "{package} depends on a package of the workspace");
+        // Comments too: examples in them are compiled.
+        for path in sources(&folder.join("src")) {
+            let text = fs::read_to_string(&path).unwrap().to_lowercase();
+            for word in ["bondwise::", "peridynamic"] {
+                assert!(!text.contains(word), "{word} in {}", path.display());
+            }
+            for word in ["unsafe ", "println!(", "print!(", "eprintln!(", "dbg!("] {
+                assert!(!code(&path).contains(word), "{word} in {}", path.display());
+            }
+        }
+    }
+}
+
+#[test]
 fn every_case_explains_itself_and_is_bundled() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("cases");
     for entry in fs::read_dir(cases).unwrap() {

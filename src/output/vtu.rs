@@ -15,11 +15,10 @@ use std::io::{self, Write};
 use std::ops::Range;
 use std::path::Path;
 
+use bondwise_picture::files::{named, write_whole};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
-
-use super::files::{named, write_whole};
 
 /// The values of one field, one entry per point.
 #[derive(Clone, Copy, Debug)]
@@ -289,7 +288,7 @@ fn escaped(text: &str) -> Cow<'_, str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::files::tests::folder;
+    use crate::output::tests::folder;
     use flate2::read::ZlibDecoder;
     use std::fs;
     use std::io::Read;

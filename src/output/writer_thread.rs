@@ -144,9 +144,9 @@ fn words(panic: &(dyn Any + Send)) -> &str {
 mod tests {
     use super::*;
     use crate::field::{Field, Values};
-    use crate::output::files::tests::folder;
     use crate::output::snapshot::Wants;
     use crate::output::source::{Facts, Points};
+    use crate::output::tests::folder;
     use crate::physics::elasticity::surface::SurfaceEffect;
     use crate::solver::Clock;
     use std::sync::Arc;

@@ -13,7 +13,7 @@ pub use super::canvas::write_png;
 /// A plot of one or more series over common axes.
 ///
 /// ```
-/// use bondwise::output::plot::{Plot, Series, Style, draw_plot};
+/// use bondwise_picture::plot::{Plot, Series, Style, draw_plot};
 /// let plot = Plot {
 ///     title: "Convergence".into(),
 ///     x_label: "spacing [m]".into(),
@@ -380,8 +380,7 @@ mod tests {
             let centre_x = ink.iter().map(|i| i % 600).sum::<usize>() as f64 / ink.len() as f64;
             // The frame: the longest run of dark pixels in the row of the point.
             let row = ink[ink.len() / 2] / 600;
-            let dark: Vec<usize> =
-                (0..600).filter(|x| image.pixels[row * 600 + x] == super::super::canvas::BLACK).collect();
+            let dark: Vec<usize> = (0..600).filter(|x| image.pixels[row * 600 + x] == crate::canvas::BLACK).collect();
             let (left, right) = (dark[dark.len() - 2], dark[dark.len() - 1]);
             let centre = 0.5 * (left + right) as f64;
             assert!((centre_x - centre).abs() < 2.0, "{centre_x} {left} {right}");

@@ -331,7 +331,7 @@ fn cut(from: [f64; 2], to: [f64; 2], clip: Area, margin: f64) -> Option<[[f64; 2
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::files::tests::folder;
+    use crate::files::tests::folder;
     use std::fs::{self, File};
     use std::io::BufReader;
 

@@ -456,7 +456,7 @@ fn paste_halved(image: &mut Image, area: Area, pixels: &[Color]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::files::tests::folder;
+    use crate::files::tests::folder;
     use std::fs::{self, File};
     use std::io::BufReader;
 

@@ -272,7 +272,7 @@ pub(super) fn draw_length(image: &mut Image, strip: Area, per_length: f64, measu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::picture::{Picture, Sizes, draw};
+    use crate::picture::{Picture, Sizes, draw};
 
     /// A block of `n` points along each edge, spacing 1.
     fn block(n: usize) -> Vec<[f64; 3]> {

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 ///
 /// If anything fails the temporary file is removed, a file that stood at `path`
 /// before is left as it was, and the error names `path`.
-pub(super) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+pub fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     // Two threads may write the same file: the number keeps their temporary files apart.
     static NEXT: AtomicU64 = AtomicU64::new(0);
     let Some(name) = path.file_name() else {
@@ -37,12 +37,12 @@ pub(super) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<File>) 
 }
 
 /// An error whose words begin with the path it is about.
-pub(super) fn named(path: &Path, kind: io::ErrorKind, reason: impl std::fmt::Display) -> io::Error {
+pub fn named(path: &Path, kind: io::ErrorKind, reason: impl std::fmt::Display) -> io::Error {
     io::Error::new(kind, format!("{}: {reason}", path.display()))
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
     use std::path::PathBuf;
 
