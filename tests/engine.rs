@@ -1,12 +1,12 @@
 //! The fast loops against the plain one: every set of instructions, precision, form and path gives the sum that a scalar
 //! loop over bonds gives, and breaks the bonds that it breaks.
 
-use bondwise::discretization::{BondWeights, Influence, Operator, PartialVolume, standard};
+use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
 use bondwise::execution::{BreakRule, Broken, Exec, Instructions, Packs, Unbreakable};
 use bondwise::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families, GROUP};
 use bondwise::field::{Double, Mixed, Number, Single};
 use bondwise::geometry::lattice::BLOCK;
-use bondwise::geometry::{Arrangement, Cloud, Shape};
+use bondwise::geometry::{Cloud, Shape};
 use bondwise::lane::Lane;
 use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
 use rand_chacha::ChaCha8Rng;
@@ -105,8 +105,10 @@ impl<const D: usize> Specimen<D> {
 
     /// Calls `visit` with each bond that holds: its ends and the bond.
     fn bonds(&self, states: &BondStates, mut visit: impl FnMut(usize, usize, Bond<D, f64>)) {
-        match (&self.body.families, &self.operator.weights, &self.body.cloud.arrangement) {
-            (Families::Lattice(families), BondWeights::Lattice(weights), Arrangement::Lattice(lattice)) => {
+        let weights = &self.operator.weights;
+        match &self.body.families {
+            Families::Lattice(families) => {
+                let (lattice, weights) = (&families.lattice, &weights.by_offset);
                 let n = families.offsets.len();
                 for &block in &families.blocks {
                     for (k, offset) in families.offsets.iter().enumerate() {
@@ -118,7 +120,9 @@ impl<const D: usize> Specimen<D> {
                     }
                 }
             }
-            (Families::Cloud(families), BondWeights::Cloud(weights), Arrangement::Scattered { positions, volumes }) => {
+            Families::Cloud(families) => {
+                let (positions, volumes) = self.body.cloud.places();
+                let weights = &weights.by_length;
                 for here in 0..positions.len() {
                     for bond in families.of(here).filter(|b| states.words()[b / GROUP] >> (b % GROUP) & 1 == 1) {
                         let there = families.neighbours[bond] as usize;
@@ -129,7 +133,6 @@ impl<const D: usize> Specimen<D> {
                     }
                 }
             }
-            _ => unreachable!("weights are built on the families of their body"),
         }
     }
 

@@ -21,8 +21,8 @@
 use super::standard::{BondWeights, CloudWeights, Operator};
 use super::{Correction, Influence, PartialVolume};
 use crate::family::{Body, Families, GROUP, Grading, Rule, Update};
-use crate::field::{Vector, difference, norm};
-use crate::geometry::{Arrangement, Cloud};
+use crate::field::{Vector, norm};
+use crate::geometry::Cloud;
 
 /// How bonds are weighted on a body whose horizons differ.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,21 +113,14 @@ impl Scaling {
         point: usize,
         mut each: impl FnMut(usize, usize, &Vector<D>, [f64; 2]),
     ) {
-        let (Families::Cloud(families), Arrangement::Scattered { positions, .. }) =
-            (&body.families, &body.cloud.arrangement)
-        else {
-            unreachable!("a lattice has no weights by bond")
-        };
         let uniform = End { size: body.cloud.spacing, horizon: body.horizon };
         let end = |slot| body.grading.as_ref().map_or(uniform, |grading| grading.end(slot));
         // Where all ends are alike, so are the rules.
         let rule = body.grading.as_ref().map_or(Rule::Source, |grading| grading.rule);
-        for (k, &j) in families.neighbours[families.of(point)].iter().enumerate() {
-            let j = j as usize;
-            if j != point {
-                let xi = difference(&positions[j], &positions[point]);
-                each(k, j, &xi, self.bond(rule, end(point), end(j), &xi));
-            }
+        // Padding stands behind the bonds of a point, so that these are numbered one by one.
+        for (k, (bit, j)) in body.bonds_of(point).enumerate() {
+            let xi = body.xi(bit, point, j);
+            each(k, j, &xi, self.bond(rule, end(point), end(j), &xi));
         }
     }
 
@@ -140,7 +133,10 @@ impl Scaling {
         old: Option<(&Operator, &Body<D>)>,
         correction: Option<&Correction<D>>,
     ) -> Operator {
-        let Families::Cloud(families) = &body.families else { unreachable!("a lattice has no weights by bond") };
+        let Families::Cloud(families) = &body.families else {
+            // All points of a lattice have one horizon, and share what they have.
+            return Operator::standard(body, self.strength, self.influence, self.rule);
+        };
         let old = old.and_then(|(operator, body)| match &body.families {
             Families::Cloud(families) => operator.stored().map(|stored| (families, stored)),
             Families::Lattice(_) => None,
@@ -156,8 +152,8 @@ impl Scaling {
         let horizons = body.grading.iter().flat_map(|grading| &grading.horizons);
         let smallest = horizons.copied().fold(body.horizon, f64::min);
         Operator {
-            weights: BondWeights::Cloud(CloudWeights::by_bond(weights.into(), smallest)),
-            volumes: BondWeights::Cloud(CloudWeights::by_fraction(fractions.into(), smallest)),
+            weights: BondWeights::stored(CloudWeights::by_bond(weights.into(), smallest)),
+            volumes: BondWeights::stored(CloudWeights::by_fraction(fractions.into(), smallest)),
         }
     }
 }

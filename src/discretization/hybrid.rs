@@ -6,9 +6,9 @@
 //!
 //! Deliberately absent: the rows themselves (`collocation`), and what makes a point go over (`physics::elasticity::hybrid`).
 
-use crate::family::{Body, BondStates, Families};
+use crate::family::{Body, BondStates, Families, LatticeFamilies};
+use crate::geometry::Lattice;
 use crate::geometry::lattice::BLOCK;
-use crate::geometry::{Arrangement, Lattice};
 use crate::visit::Visitor;
 
 /// Which scheme holds at which point.
@@ -177,11 +177,9 @@ impl Regions {
     }
 }
 
-fn parts<const D: usize>(body: &Body<D>) -> (&Lattice<D>, &crate::family::LatticeFamilies<D>) {
-    match (&body.cloud.arrangement, &body.families) {
-        (Arrangement::Lattice(lattice), Families::Lattice(families)) => (lattice, families),
-        _ => panic!("the hybrid scheme is for lattices"),
-    }
+fn parts<const D: usize>(body: &Body<D>) -> (&Lattice<D>, &LatticeFamilies<D>) {
+    let Families::Lattice(families) = &body.families else { panic!("the hybrid scheme is for lattices") };
+    (&families.lattice, families)
 }
 
 #[cfg(test)]

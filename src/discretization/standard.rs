@@ -10,9 +10,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{Influence, PartialVolume};
-use crate::family::{Body, CloudFamilies, Families, GROUP};
-use crate::field::{Vector, difference};
-use crate::geometry::Arrangement;
+use crate::family::{Body, CloudFamilies, Families, GROUP, Offset};
+use crate::field::{Vector, difference, norm};
+use crate::geometry::lattice::BLOCK;
 
 /// The weights of one law on one body.
 #[derive(Debug, Clone)]
@@ -25,10 +25,11 @@ pub struct Operator {
 
 /// The weight of each bond.
 #[derive(Debug, Clone)]
-pub enum BondWeights {
-    /// By offset of the shared family.
-    Lattice(Vec<f64>),
-    Cloud(CloudWeights),
+pub struct BondWeights {
+    /// By offset, where all points share their family.
+    pub by_offset: Vec<f64>,
+    /// By length, where each point has its own.
+    pub by_length: CloudWeights,
 }
 
 /// The weight of a bond of a scattered cloud, from its length and the volume at its other end.
@@ -87,70 +88,77 @@ impl Operator {
         rule: PartialVolume,
     ) -> Operator {
         let (horizon, spacing) = (body.horizon, body.cloud.spacing);
-        match (&body.families, &body.cloud.arrangement) {
-            (Families::Lattice(families), Arrangement::Lattice(lattice)) => {
-                let volumes: Vec<f64> = families
-                    .offsets
-                    .iter()
-                    .map(|o| rule.fraction(&o.xi, spacing, horizon) * lattice.cell_volume())
-                    .collect();
-                let weights = families
-                    .offsets
-                    .iter()
-                    .zip(&volumes)
-                    .map(|(o, v)| strength * influence.quadrature_value(o.length / horizon) * v)
-                    .collect();
-                Operator { weights: BondWeights::Lattice(weights), volumes: BondWeights::Lattice(volumes) }
+        let mut by_offset = [Vec::new(), Vec::new()];
+        let mut fractions = match rule {
+            PartialVolume::Ramp => Fractions::Ramp,
+            _ => Fractions::Full,
+        };
+        match &body.families {
+            Families::Lattice(families) => {
+                let volume = |o: &Offset<D>| rule.fraction(&o.xi, spacing, horizon) * families.lattice.cell_volume();
+                let volumes: Vec<f64> = families.offsets.iter().map(volume).collect();
+                let weight = |(o, v): (&Offset<D>, &f64)| strength * influence.quadrature_value(o.length / horizon) * v;
+                by_offset = [families.offsets.iter().zip(&volumes).map(weight).collect(), volumes];
             }
-            (Families::Cloud(families), Arrangement::Scattered { positions, .. }) => {
-                let fractions = match rule {
-                    PartialVolume::None => Fractions::Full,
-                    PartialVolume::Ramp => Fractions::Ramp,
-                    PartialVolume::Exact => {
-                        let fraction = |i: usize, j: u32| {
-                            let xi: Vector<D> = difference(&positions[j as usize], &positions[i]);
-                            (rule.fraction(&xi, spacing, horizon) * 65535.0).round() as u16
-                        };
-                        let mut stored: Arc<[u16]> = std::iter::repeat_n(0, families.neighbours.len()).collect();
-                        let values = Arc::get_mut(&mut stored).expect("nobody else has it yet");
-                        let pieces = CloudFamilies::pieces(&families.starts, values, GROUP);
-                        pieces.into_par_iter().for_each(|(points, values)| {
-                            let mut values = values.iter_mut();
-                            for i in points {
-                                for (&j, value) in families.neighbours[families.of(i)].iter().zip(&mut values) {
-                                    *value = fraction(i, j);
-                                }
-                            }
-                        });
-                        Fractions::Stored(stored)
-                    }
+            Families::Cloud(families) if rule == PartialVolume::Exact => {
+                let fraction = |i: usize, j: u32| {
+                    let xi: Vector<D> = difference(&body.cloud.position(j as usize), &body.cloud.position(i));
+                    (rule.fraction(&xi, spacing, horizon) * 65535.0).round() as u16
                 };
-                let weights = CloudWeights { strength, influence, horizon, spacing, fractions };
-                let volumes = CloudWeights { strength: 1.0, influence: Influence::Constant, ..weights.clone() };
-                Operator { weights: BondWeights::Cloud(weights), volumes: BondWeights::Cloud(volumes) }
+                let mut stored: Arc<[u16]> = std::iter::repeat_n(0, families.neighbours.len()).collect();
+                let values = Arc::get_mut(&mut stored).expect("nobody else has it yet");
+                let pieces = CloudFamilies::pieces(&families.starts, values, GROUP);
+                pieces.into_par_iter().for_each(|(points, values)| {
+                    let mut values = values.iter_mut();
+                    for i in points {
+                        for (&j, value) in families.neighbours[families.of(i)].iter().zip(&mut values) {
+                            *value = fraction(i, j);
+                        }
+                    }
+                });
+                fractions = Fractions::Stored(stored);
             }
-            _ => unreachable!("families are built from the arrangement of their cloud"),
+            Families::Cloud(_) => {}
+        }
+        let weights = CloudWeights { strength, influence, horizon, spacing, fractions };
+        let volumes = CloudWeights { strength: 1.0, influence: Influence::Constant, ..weights.clone() };
+        let [offset_weights, offset_volumes] = by_offset;
+        Operator {
+            weights: BondWeights { by_offset: offset_weights, by_length: weights },
+            volumes: BondWeights { by_offset: offset_volumes, by_length: volumes },
         }
     }
 
     /// Bytes that the operator keeps for its bonds.
     pub fn memory(&self) -> usize {
-        match &self.weights {
-            BondWeights::Lattice(weights) => 2 * 8 * weights.len(),
-            BondWeights::Cloud(CloudWeights { fractions: Fractions::Stored(f), .. }) => 2 * f.len(),
-            BondWeights::Cloud(CloudWeights { fractions: Fractions::Weights(w), .. }) => (2 + 8) * w.len(),
-            BondWeights::Cloud(_) => 0,
-        }
+        let by_bond = match &self.weights.by_length.fractions {
+            Fractions::Stored(f) => 2 * f.len(),
+            Fractions::Weights(w) => (2 + 8) * w.len(),
+            Fractions::Full | Fractions::Ramp => 0,
+        };
+        2 * size_of_val(&self.weights.by_offset[..]) + by_bond
     }
 
     /// The weights by bond, and the fractions of the volumes, where these are stored.
     pub(crate) fn stored(&self) -> Option<(&[f64], &[u16])> {
-        match (&self.weights, &self.volumes) {
-            (
-                BondWeights::Cloud(CloudWeights { fractions: Fractions::Weights(weights), .. }),
-                BondWeights::Cloud(CloudWeights { fractions: Fractions::Stored(fractions), .. }),
-            ) => Some((weights, fractions)),
+        match (&self.weights.by_length.fractions, &self.volumes.by_length.fractions) {
+            (Fractions::Weights(weights), Fractions::Stored(fractions)) => Some((weights, fractions)),
             _ => None,
+        }
+    }
+}
+
+impl BondWeights {
+    /// Of a cloud, by bond.
+    pub(super) fn stored(by_length: CloudWeights) -> Self {
+        BondWeights { by_offset: Vec::new(), by_length }
+    }
+
+    /// The weight of a bond of a body: bit number `bit` of its states, to the slot `there`, with ξ.
+    pub fn of<const D: usize>(&self, body: &Body<D>, bit: usize, there: usize, xi: &Vector<D>) -> f64 {
+        match &body.families {
+            Families::Lattice(families) => self.by_offset[bit / BLOCK % families.offsets.len()],
+            Families::Cloud(_) => self.by_length.weight(bit, norm(xi), body.cloud.volume(there)),
         }
     }
 }

@@ -1,12 +1,12 @@
-//! What is asked of a cloud now and then, bond by bond: gradients by least squares, and the largest of some value of bonds.
+//! What is asked of a body now and then, bond by bond: gradients by least squares, and the largest of some value of bonds.
 //! Not for the inside of a loop over time.
 
 use rayon::prelude::*;
 
-use crate::family::{Body, Bond, BondStates, Families, GROUP};
-use crate::field::{Number, Vector, difference, dot, norm};
+use crate::family::{Body, Bond, BondStates};
+use crate::field::{Number, Vector, dot, norm};
 
-/// ∇f at `slots` of a cloud for each of some fields: the g that minimises Σ V′ (g·ξ − Δf)²/|ξ|⁶ over the bonds that hold.
+/// ∇f at `slots` for each of some fields: the g that minimises Σ V′ (g·ξ − Δf)²/|ξ|⁶ over the bonds that hold.
 /// Exact for linear fields. Zero where the bonds that are left do not span space. The nearest points count for nearly all,
 /// so that short waves keep their slope: a gradient over the whole family smooths them, and turns ramps into stairs.
 pub fn gradients<const D: usize, const N: usize, T: Number>(
@@ -15,19 +15,11 @@ pub fn gradients<const D: usize, const N: usize, T: Number>(
     fields: [&[T]; N],
     slots: &[u32],
 ) -> Vec<[Vector<D>; N]> {
-    let (Families::Cloud(families), words) = (&body.families, states.words()) else {
-        unreachable!("gradients are asked for on clouds")
-    };
     let gradient = |&slot: &u32| {
         let slot = slot as usize;
-        let x = body.cloud.position(slot);
         let (mut shape, mut right) = ([[0.0; D]; D], [[0.0; D]; N]);
-        for bond in families.of(slot) {
-            if words[bond / GROUP] >> (bond % GROUP) & 1 == 0 {
-                continue;
-            }
-            let there = families.neighbours[bond] as usize;
-            let xi = difference(&body.cloud.position(there), &x);
+        for (bit, there) in body.bonds_of(slot).filter(|(bit, _)| states.holds(*bit)) {
+            let xi = body.xi(bit, slot, there);
             let weight = body.cloud.volume(there) / dot(&xi, &xi).powi(3);
             for a in 0..D {
                 for b in 0..D {
@@ -50,17 +42,10 @@ pub fn largest<const D: usize, T: Number>(
     fields: [&[T]; D],
     value: impl Fn(&Bond<D, f64>, &Vector<D>, usize, usize) -> f64 + Sync,
 ) -> Vec<f64> {
-    let (Families::Cloud(families), words) = (&body.families, states.words()) else {
-        unreachable!("single bonds are asked for on clouds")
-    };
     let largest = |slot: usize| {
-        let (x, mut most) = (body.cloud.position(slot), 0.0f64);
-        for bond in families.of(slot) {
-            if words[bond / GROUP] >> (bond % GROUP) & 1 == 0 {
-                continue;
-            }
-            let there = families.neighbours[bond] as usize;
-            let xi = difference(&body.cloud.position(there), &x);
+        let mut most = 0.0f64;
+        for (bit, there) in body.bonds_of(slot).filter(|(bit, _)| states.holds(*bit)) {
+            let xi = body.xi(bit, slot, there);
             let relative = std::array::from_fn(|d| fields[d][there].to_f64() - fields[d][slot].to_f64());
             most = most.max(value(&Bond::new(xi, norm(&xi), 1.0), &relative, slot, there));
         }

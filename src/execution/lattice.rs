@@ -8,10 +8,10 @@
 
 use super::packs::{Ends, Instructions, Pack, Packs};
 use super::{BreakRule, Broken, SharedSlice, StatesPointer};
-use crate::family::{Body, Bond, BondKernel, LatticeFamilies};
+use crate::family::{Bond, BondKernel, LatticeFamilies};
 use crate::field::{Number, Precision};
+use crate::geometry::Lattice;
 use crate::geometry::lattice::BLOCK;
-use crate::geometry::{Arrangement, Lattice};
 use crate::lane::Lane;
 
 /// Blocks in a chunk: the unit that threads share out, and of the ordered sums. Fixed, whatever the threads.
@@ -38,15 +38,7 @@ struct Row<const D: usize, B> {
 
 impl<'a, const D: usize, B: Number> View<'a, D, B> {
     /// Over all blocks of the families, or over those in `within`.
-    pub fn new(
-        body: &'a Body<D>,
-        families: &'a LatticeFamilies<D>,
-        weights: &'a [f64],
-        within: Option<&'a [u32]>,
-    ) -> Self {
-        let Arrangement::Lattice(lattice) = &body.cloud.arrangement else {
-            unreachable!("lattice families belong to a lattice")
-        };
+    pub fn new(families: &'a LatticeFamilies<D>, weights: &'a [f64], within: Option<&'a [u32]>) -> Self {
         assert_eq!(weights.len(), families.offsets.len(), "one weight an offset");
         let rows = families.offsets.iter().zip(weights).map(|(offset, &weight)| {
             let Bond { xi, length, inverse_square, weight, spring } = Bond::new(offset.xi, offset.length, weight);
@@ -59,7 +51,13 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
                 spring: B::from_f64(spring),
             }
         });
-        View { lattice, families, weights, blocks: within.unwrap_or(&families.blocks), rows: rows.collect() }
+        View {
+            lattice: &families.lattice,
+            families,
+            weights,
+            blocks: within.unwrap_or(&families.blocks),
+            rows: rows.collect(),
+        }
     }
 
     pub fn n_chunks(&self) -> usize {

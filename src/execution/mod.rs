@@ -263,10 +263,10 @@ impl Exec {
         assert!(output.iter().all(|f| f.len() == n), "output fields have the length of the cloud");
         let output = output.map(|f| SharedSlice(f.as_mut_ptr()));
         let instructions = self.instructions;
-        match (&body.families, weights) {
-            (Families::Lattice(families), BondWeights::Lattice(weights)) => {
+        match &body.families {
+            Families::Lattice(families) => {
                 let within = self.within.take();
-                let view = &lattice::View::new(body, families, weights, within.as_deref());
+                let view = &lattice::View::new(families, &weights.by_offset, within.as_deref());
                 let sum = lattice::Sum::<D, I, A, O, P, _> { instructions, view, states, input, added, output, kernel };
                 let broken = if K::LINEAR && R::NEVER {
                     let sum = rows::Sum::new(&sum);
@@ -280,7 +280,8 @@ impl Exec {
                 self.within = within;
                 broken
             }
-            (Families::Cloud(families), BondWeights::Cloud(weights)) => {
+            Families::Cloud(families) => {
+                let weights = &weights.by_length;
                 let mut records = std::mem::take(P::records(&mut self.double, &mut self.single));
                 let values: Vec<&[P::Field]> = input.iter().chain(&added).copied().collect();
                 cloud::gather_input(&values, &mut records);
@@ -302,7 +303,6 @@ impl Exec {
                 *P::records(&mut self.double, &mut self.single) = records;
                 broken
             }
-            _ => unreachable!("weights are built on the families of their body"),
         }
     }
 

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use super::graded::Grading;
 use super::search;
-use crate::field::{Vector, norm};
+use crate::field::{Vector, difference, norm};
 use crate::geometry::lattice::BLOCK;
 use crate::geometry::{Arrangement, Cloud, Lattice};
 
@@ -47,6 +47,7 @@ pub struct Offset<const D: usize> {
 /// symmetric stays symmetric.
 #[derive(Debug, Clone)]
 pub struct LatticeFamilies<const D: usize> {
+    pub lattice: Lattice<D>,
     pub offsets: Vec<Offset<D>>,
     pub classes: Vec<Class>,
     /// Blocks of slots that hold a point, in the order in which they are visited: a sparse body does not pay for its box.
@@ -154,6 +155,46 @@ impl<const D: usize> Body<D> {
     }
 }
 
+/// What of a lattice and what of a cloud: whoever goes from bond to bond outside the loops of `execution` asks here.
+impl<const D: usize> Body<D> {
+    /// The bonds of a point that are in its family: the number of the bit of each, and the slot of x′.
+    pub fn bonds_of(&self, slot: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        // One of two, the other empty: without a pointer to either.
+        let (shared, own) = match &self.families {
+            Families::Lattice(families) => {
+                let (n, lattice) = (families.offsets.len(), &families.lattice);
+                let block = slot.checked_sub(lattice.guard).map_or(usize::MAX, |inside| inside / BLOCK);
+                let offsets = if block < lattice.n_blocks() { &families.offsets[..] } else { &[] };
+                let bond = move |(k, offset): (usize, &Offset<D>)| {
+                    ((block * n + k) * BLOCK + slot % BLOCK, slot.wrapping_add_signed(offset.shift))
+                };
+                (Some(offsets.iter().enumerate().map(bond)), None)
+            }
+            Families::Cloud(families) => {
+                let bonds = families.of(slot).map(|bond| (bond, families.neighbours[bond] as usize));
+                (None, Some(bonds.filter(move |(_, there)| *there != slot)))
+            }
+        };
+        shared.into_iter().flatten().chain(own.into_iter().flatten())
+    }
+
+    /// ξ of the bond with the state `bit` between two slots, m: on a lattice that which all points share.
+    pub fn xi(&self, bit: usize, here: usize, there: usize) -> Vector<D> {
+        match &self.families {
+            Families::Lattice(families) => families.offsets[bit / BLOCK % families.offsets.len()].xi,
+            Families::Cloud(_) => difference(&self.cloud.position(there), &self.cloud.position(here)),
+        }
+    }
+
+    /// How many words the states of all bonds are.
+    pub fn n_words(&self) -> usize {
+        match &self.families {
+            Families::Lattice(families) => families.lattice.n_blocks() * families.offsets.len(),
+            Families::Cloud(families) => families.neighbours.len() / GROUP,
+        }
+    }
+}
+
 impl<const D: usize> LatticeFamilies<D> {
     fn new(lattice: &Lattice<D>, slots: &[u32], rim: Range<f64>, accept: impl Fn(&Vector<D>) -> bool) -> Self {
         let h = lattice.spacing;
@@ -176,7 +217,7 @@ impl<const D: usize> LatticeFamilies<D> {
         let mut blocks: Vec<u32> = slots.iter().map(|&s| ((s as usize - lattice.guard) / BLOCK) as u32).collect();
         blocks.dedup();
         tile(lattice, n as usize, &mut blocks);
-        LatticeFamilies { offsets, classes, blocks }
+        LatticeFamilies { lattice: lattice.clone(), offsets, classes, blocks }
     }
 }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::families::{Body, CloudFamilies, Families, GROUP, PIECE, Sites};
 use super::search;
 use crate::field::{Vector, difference, norm};
-use crate::geometry::{Arrangement, Cloud};
+use crate::geometry::Cloud;
 
 /// Whose horizon and micromodulus a bond has. All agree where the horizon and the cells are uniform.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -63,11 +63,10 @@ impl<const D: usize> Body<D> {
         reach: f64,
         touches: impl Fn(usize, usize, &Vector<D>) -> bool + Sync,
     ) -> Self {
-        let Arrangement::Scattered { positions, volumes } = &cloud.arrangement else {
-            unreachable!("cells of different sizes are no lattice")
-        };
-        let mut families = search::families(positions, 0.0..reach, touches);
-        families.sites = Sites::new(positions, volumes);
+        let cloud = cloud.scattered_already();
+        let (positions, volumes) = cloud.places();
+        let mut families = search::families(&positions, 0.0..reach, touches);
+        families.sites = Sites::new(&positions, &volumes);
         let horizon = grading.horizons.iter().copied().fold(0.0, f64::max);
         Body { cloud, families: Families::Cloud(families), horizon, grading: Some(grading) }
     }
@@ -82,14 +81,12 @@ impl<const D: usize> Body<D> {
         reach: f64,
         touches: impl Fn(usize, usize, &Vector<D>) -> bool + Sync,
     ) -> (Self, Update) {
-        let (
-            Arrangement::Scattered { positions, volumes },
-            Arrangement::Scattered { positions: before, .. },
-            Families::Cloud(old),
-        ) = (&cloud.arrangement, &self.cloud.arrangement, &self.families)
-        else {
-            unreachable!("cells of different sizes are no lattice")
+        let Families::Cloud(old) = &self.families else {
+            // Nothing of a lattice can be kept.
+            return (Body::graded(cloud, grading, reach, touches), Update::default());
         };
+        let cloud = cloud.scattered_already();
+        let ((positions, volumes), (before, _)) = (cloud.places(), self.cloud.places());
         let mut into = vec![NEW; before.len()];
         for (new, &old) in same.iter().enumerate().filter(|(_, old)| **old != NEW) {
             into[old as usize] = new as u32;
@@ -110,7 +107,7 @@ impl<const D: usize> Body<D> {
                 _ => ranges.push(k..k + 1),
             }
         }
-        let pieces = search::pieces(positions, ranges.clone(), 0.0..reach, touches);
+        let pieces = search::pieces(&positions, ranges.clone(), 0.0..reach, touches);
         let mut starts = Vec::with_capacity(same.len() + 1);
         starts.push(0);
         let mut neighbours = Vec::with_capacity(old.neighbours.len());
@@ -127,7 +124,7 @@ impl<const D: usize> Body<D> {
                 k += 1;
             }
         }
-        let families = CloudFamilies { starts, neighbours, sites: Sites::new(positions, volumes) };
+        let families = CloudFamilies { starts, neighbours, sites: Sites::new(&positions, &volumes) };
         let horizon = grading.horizons.iter().copied().fold(0.0, f64::max);
         (Body { cloud, families: Families::Cloud(families), horizon, grading: Some(grading) }, Update { from })
     }

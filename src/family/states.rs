@@ -7,32 +7,34 @@
 use rayon::prelude::*;
 
 use super::{Body, CloudFamilies, Families, GROUP};
+use crate::geometry::Crack;
 use crate::geometry::lattice::BLOCK;
-use crate::geometry::{Arrangement, Crack};
 
-/// One bit for each directed bond.
+/// One bit for each directed bond: of a lattice in `words[block * offsets + offset]`, of a cloud in `words[group of bonds]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum BondStates {
-    /// `words[block * offsets + offset]`
-    Lattice(Vec<u16>),
-    /// `words[group of bonds]`
-    Cloud(Vec<u16>),
+pub struct BondStates {
+    words: Vec<u16>,
 }
 
 impl BondStates {
+    /// Of words in the order of the families.
+    pub fn new(words: Vec<u16>) -> Self {
+        BondStates { words }
+    }
+
     /// All bonds of a body, whole. On a lattice, bonds to absent points never exist.
     pub fn whole<const D: usize>(body: &Body<D>) -> Self {
-        match (&body.cloud.arrangement, &body.families) {
-            (Arrangement::Lattice(lattice), Families::Lattice(families)) => {
+        let mut words = vec![0u16; body.n_words()];
+        match &body.families {
+            Families::Lattice(families) => {
+                let lattice = &families.lattice;
                 let mut present = vec![0u16; lattice.n_slots / BLOCK];
                 for &slot in &body.cloud.slots {
                     present[slot as usize / BLOCK] |= 1 << (slot as usize % BLOCK);
                 }
-                let n_offsets = families.offsets.len();
                 let first = lattice.guard / BLOCK;
                 let row_blocks = lattice.counts[0].div_ceil(BLOCK);
-                let mut words = vec![0u16; lattice.n_blocks() * n_offsets];
-                words.par_chunks_mut(n_offsets).enumerate().for_each(|(block, words)| {
+                words.par_chunks_mut(families.offsets.len().max(1)).enumerate().for_each(|(block, words)| {
                     let here = present[first + block];
                     if here == 0 {
                         return;
@@ -54,10 +56,8 @@ impl BondStates {
                         *word = here & window as u16;
                     }
                 });
-                BondStates::Lattice(words)
             }
-            (_, Families::Cloud(families)) => {
-                let mut words = vec![0u16; families.neighbours.len() / GROUP];
+            Families::Cloud(families) => {
                 let pieces = CloudFamilies::pieces(&families.starts, &mut words, 1);
                 pieces.into_par_iter().for_each(|(points, words)| {
                     words.fill(u16::MAX);
@@ -71,76 +71,60 @@ impl BondStates {
                         words[(families.starts[point + 1] - first) as usize - 1] = u16::MAX >> (GROUP - bonds);
                     }
                 });
-                BondStates::Cloud(words)
             }
-            _ => unreachable!("families are built from the arrangement of their cloud"),
         }
+        BondStates { words }
     }
 
     /// Directed bonds that hold.
     pub fn count(&self) -> u64 {
-        self.words().iter().map(|w| u64::from(w.count_ones())).sum()
+        self.words.iter().map(|w| u64::from(w.count_ones())).sum()
+    }
+
+    /// Whether the bond holds whose state is bit `bit % 16` of word `bit / 16`.
+    pub fn holds(&self, bit: usize) -> bool {
+        self.words[bit / BLOCK] >> (bit % BLOCK) & 1 == 1
     }
 
     /// Bonds of each point that hold, in point order.
     pub fn per_point<const D: usize>(&self, body: &Body<D>) -> Vec<u32> {
-        let slots = body.cloud.slots.iter().map(|&s| s as usize);
-        match (self, &body.families, &body.cloud.arrangement) {
-            (BondStates::Lattice(words), Families::Lattice(families), Arrangement::Lattice(lattice)) => {
-                let n = families.offsets.len();
-                let count = |slot: usize| {
-                    let block = (slot - lattice.guard) / BLOCK;
-                    words[block * n..(block + 1) * n].iter().map(|w| u32::from(w >> (slot % BLOCK) & 1)).sum()
-                };
-                slots.map(count).collect()
-            }
-            (BondStates::Cloud(words), Families::Cloud(families), _) => slots
-                .map(|p| {
-                    let groups = families.starts[p] as usize..families.starts[p + 1] as usize;
-                    words[groups].iter().map(|w| w.count_ones()).sum()
-                })
-                .collect(),
-            _ => unreachable!("states are built from the families of their body"),
-        }
+        let count = |slot: &u32| body.bonds_of(*slot as usize).filter(|(bit, _)| self.holds(*bit)).count() as u32;
+        body.cloud.slots.par_iter().map(count).collect()
     }
 
-    /// The words, one a block and offset of a lattice, one a group of a cloud.
+    /// The words.
     pub fn words(&self) -> &[u16] {
-        let (BondStates::Lattice(words) | BondStates::Cloud(words)) = self;
-        words
+        &self.words
     }
 
     pub fn words_mut(&mut self) -> &mut [u16] {
-        let (BondStates::Lattice(words) | BondStates::Cloud(words)) = self;
-        words
+        &mut self.words
     }
 
     /// The same, to be shown and replaced.
     pub fn vector(&mut self) -> &mut Vec<u16> {
-        let (BondStates::Lattice(words) | BondStates::Cloud(words)) = self;
-        words
+        &mut self.words
     }
 
     /// The slots of x and x′ of the bond whose state is bit `bit % 16` of word `bit / 16`.
     pub fn ends<const D: usize>(&self, body: &Body<D>, bit: usize) -> [usize; 2] {
-        match (self, &body.families, &body.cloud.arrangement) {
-            (BondStates::Lattice(_), Families::Lattice(families), Arrangement::Lattice(lattice)) => {
+        match &body.families {
+            Families::Lattice(families) => {
                 let (word, n) = (bit / BLOCK, families.offsets.len());
-                let slot = lattice.guard + word / n * BLOCK + bit % BLOCK;
+                let slot = families.lattice.guard + word / n * BLOCK + bit % BLOCK;
                 [slot, slot.wrapping_add_signed(families.offsets[word % n].shift)]
             }
-            (BondStates::Cloud(_), Families::Cloud(families), _) => {
+            Families::Cloud(families) => {
                 let group = (bit / GROUP) as u64;
                 let point = families.starts.partition_point(|&start| start <= group) - 1;
                 [point, families.neighbours[bit] as usize]
             }
-            _ => unreachable!("states are built from the families of their body"),
         }
     }
 
     /// The words as bytes, for hashing and saving.
     pub fn bytes(&self) -> Vec<u8> {
-        self.words().iter().flat_map(|w| w.to_le_bytes()).collect()
+        self.words.iter().flat_map(|w| w.to_le_bytes()).collect()
     }
 
     /// Breaks every bond that `crack` cuts; returns how many directed bonds it broke. `tolerance` in m: what counts
@@ -154,42 +138,21 @@ impl BondStates {
         let near = body.cloud.select(|x| (0..D).all(|d| x[d] >= low[d] - reach && x[d] <= high[d] + reach));
         let blade = crack.blade(tolerance);
         let mut cut = 0;
-        for slot in near {
-            let slot = slot as usize;
+        for slot in near.into_iter().map(|slot| slot as usize) {
             let a = body.cloud.position(slot);
-            self.retain(body, slot, |other| {
-                let keep = !blade.cuts(&a, &body.cloud.position(other));
-                cut += u64::from(!keep);
-                keep
-            });
+            for (bit, there) in body.bonds_of(slot) {
+                if self.holds(bit) && blade.cuts(&a, &body.cloud.position(there)) {
+                    self.words[bit / BLOCK] &= !(1 << (bit % BLOCK));
+                    cut += 1;
+                }
+            }
         }
         cut
     }
-
-    /// Clears the bits of the bonds of `slot` that hold now and whose other end `keep` refuses.
-    fn retain<const D: usize>(&mut self, body: &Body<D>, slot: usize, mut keep: impl FnMut(usize) -> bool) {
-        match (self, &body.families, &body.cloud.arrangement) {
-            (BondStates::Lattice(words), Families::Lattice(families), Arrangement::Lattice(lattice)) => {
-                let n = families.offsets.len();
-                let (block, bit) = ((slot - lattice.guard) / BLOCK, slot % BLOCK);
-                for (word, offset) in words[block * n..(block + 1) * n].iter_mut().zip(&families.offsets) {
-                    if *word >> bit & 1 == 1 && !keep(slot.wrapping_add_signed(offset.shift)) {
-                        *word &= !(1 << bit);
-                    }
-                }
-            }
-            (BondStates::Cloud(words), Families::Cloud(families), _) => {
-                for bond in families.of(slot) {
-                    let word = &mut words[bond / GROUP];
-                    if *word >> (bond % GROUP) & 1 == 1 && !keep(families.neighbours[bond] as usize) {
-                        *word &= !(1 << (bond % GROUP));
-                    }
-                }
-            }
-            _ => unreachable!("states are built from the families of their body"),
-        }
-    }
 }
+
+/// A bit of a word is a slot of a block on a lattice, and a bond of a group on a cloud.
+const _: () = assert!(BLOCK == GROUP);
 
 #[cfg(test)]
 mod tests {

@@ -81,6 +81,20 @@ impl<const D: usize> Cloud<D> {
         Cloud { spacing: self.spacing, ..Cloud::scattered(positions, slots.map(|slot| self.volume(slot)).collect()) }
     }
 
+    /// Itself, or if it is a lattice the same points as no lattice any more.
+    pub fn scattered_already(self) -> Self {
+        match self.arrangement {
+            Arrangement::Lattice(_) => self.scatter(),
+            Arrangement::Scattered { .. } => self,
+        }
+    }
+
+    /// Positions (m) and volumes by slot.
+    pub fn places(&self) -> (Vec<Vector<D>>, Vec<f64>) {
+        let slots = 0..self.n_slots();
+        (slots.clone().map(|slot| self.position(slot)).collect(), slots.map(|slot| self.volume(slot)).collect())
+    }
+
     /// Points that lie along a curve already, so that slots are in point order.
     pub fn along_curve(positions: Vec<Vector<D>>, volumes: Vec<f64>) -> Self {
         let slots = (0..positions.len() as u32).collect();

@@ -5,7 +5,7 @@ use super::Builder;
 use crate::discretization::collocation::gate::{Law, bearable_in_motion};
 use crate::discretization::collocation::{SharedRow, SharedSlope};
 use crate::discretization::moments::ball_moment;
-use crate::discretization::{BondWeights, Collocation, Regions, Scaling};
+use crate::discretization::{Collocation, Regions, Scaling};
 use crate::error::{Error, Result};
 use crate::execution::{Limits, Packs};
 use crate::family::{Body, Families};
@@ -114,11 +114,8 @@ impl<const D: usize> Builder<'_, D> {
 /// Scales the weights of a lattice so that Σ w |ξ| is the integral ∫ c ω |ξ| dV, to which the energy of expansion and the mean
 /// stiffness over all directions are proportional.
 pub(super) fn rescale<const D: usize, P: Packs>(elasticity: &mut Elasticity<D, P>, scaling: &Scaling) {
-    let (Families::Lattice(families), BondWeights::Lattice(weights)) =
-        (&elasticity.body.families, &mut elasticity.operator.weights)
-    else {
-        return;
-    };
+    let Families::Lattice(families) = &elasticity.body.families else { return };
+    let weights = &mut elasticity.operator.weights.by_offset;
     let sum: f64 = families.offsets.iter().zip(&*weights).map(|(offset, weight)| weight * offset.length).sum();
     let integral = scaling.strength * ball_moment(&scaling.influence, [0; D], -1.0, scaling.horizon);
     weights.iter_mut().for_each(|weight| *weight *= integral / sum);

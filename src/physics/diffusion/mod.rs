@@ -108,8 +108,10 @@ impl Diffusion {
         let row: BTreeMap<[i32; D], f64> = fit.steps.into_iter().flatten().zip(row).collect();
         let step = |xi: &Vector<D>| xi.map(|x| (x / spacing).round() as i32);
         let body = Body::new(cloud, horizon, 0.0..horizon * (1.0 + RIM_TOLERANCE), |xi| row.contains_key(&step(xi)));
-        let Families::Lattice(families) = &body.families else { unreachable!("families of a lattice are shared") };
-        let weights = BondWeights::Lattice(families.offsets.iter().map(|offset| row[&offset.step]).collect());
+        let mut weights = Operator::standard(&body, 1.0, Influence::Constant, PartialVolume::None).weights;
+        if let Families::Lattice(families) = &body.families {
+            weights.by_offset = families.offsets.iter().map(|offset| row[&offset.step]).collect();
+        }
         let bonds = BondStates::whole(&body);
         Ok((body, Diffusion(Scheme::Sum { weights, q: 0, bonds })))
     }
@@ -161,8 +163,8 @@ impl Diffusion {
     pub fn stable_step<const D: usize>(&self, body: &Body<D>) -> f64 {
         let largest = match (&self.0, &body.families) {
             (Scheme::Rows(rows), _) => rows.largest(),
-            (Scheme::Sum { weights: BondWeights::Lattice(weights), q, .. }, Families::Lattice(families)) => {
-                let sizes = families.offsets.iter().zip(weights);
+            (Scheme::Sum { weights, q, .. }, Families::Lattice(families)) => {
+                let sizes = families.offsets.iter().zip(&weights.by_offset);
                 sizes.map(|(offset, w)| w.abs() / offset.length.powi(*q as i32)).sum()
             }
             (Scheme::Sum { weights, q, bonds }, _) => {
@@ -178,12 +180,10 @@ impl Diffusion {
     ///
     /// Of the standard scheme it is not K: 1 − 1/(2m) of it in 1D with q = 2 and partial volumes, however fine the lattice.
     pub fn diffusivity<const D: usize>(&self, body: &Body<D>) -> Option<f64> {
-        let (Scheme::Sum { weights: BondWeights::Lattice(weights), q, .. }, Families::Lattice(families)) =
-            (&self.0, &body.families)
-        else {
+        let (Scheme::Sum { weights, q, .. }, Families::Lattice(families)) = (&self.0, &body.families) else {
             return None;
         };
-        let terms = families.offsets.iter().zip(weights);
+        let terms = families.offsets.iter().zip(&weights.by_offset);
         Some(terms.map(|(o, w)| 0.5 * w * o.xi[0] * o.xi[0] / o.length.powi(*q as i32)).sum())
     }
 
@@ -191,8 +191,8 @@ impl Diffusion {
     #[must_use]
     pub fn calibrated<const D: usize>(mut self, body: &Body<D>, diffusivity: f64) -> Self {
         let found = self.diffusivity(body);
-        if let (Scheme::Sum { weights: BondWeights::Lattice(weights), .. }, Some(found)) = (&mut self.0, found) {
-            weights.iter_mut().for_each(|w| *w *= diffusivity / found);
+        if let (Scheme::Sum { weights, .. }, Some(found)) = (&mut self.0, found) {
+            weights.by_offset.iter_mut().for_each(|w| *w *= diffusivity / found);
         }
         self
     }

@@ -73,13 +73,11 @@ impl<const D: usize> Adaptation<D> {
     /// Points that a coarser one sees although finer cells are asked for there (the visibility criterion of Bobaru et al.
     /// 2009, section 5.1).
     pub fn seen(&self, body: &Body<D>, asked: &[u8]) -> usize {
-        let Families::Cloud(families) = &body.families else { unreachable!("cells of different sizes are no lattice") };
         let list = self.cells.list();
         let sees = |k: usize| {
-            let row = &families.neighbours[families.of(k)];
-            row.iter().any(|&j| {
-                let far = norm(&difference(&body.cloud.position(j as usize), &body.cloud.position(k)));
-                asked[j as usize] > list[k].level && far <= self.ratio * self.cells.size(list[k].level)
+            body.bonds_of(k).any(|(bit, j)| {
+                let far = norm(&body.xi(bit, k, j));
+                asked[j] > list[k].level && far <= self.ratio * self.cells.size(list[k].level)
             })
         };
         (0..list.len()).into_par_iter().filter(|&k| sees(k)).count()
@@ -244,7 +242,8 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         let horizons = grading.horizons.clone();
         let (mut body, update) = adaptation.scaling.replaced(&self.body, cells.cloud(), grading, &same);
         let (Families::Cloud(families), Families::Cloud(old_families)) = (&body.families, &self.body.families) else {
-            unreachable!("cells of different sizes are no lattice")
+            // The cells of a lattice are what they are.
+            return None;
         };
         let cuts = Cuts {
             body: &self.body,
@@ -292,7 +291,7 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         self.merge_class = remap.origins.iter().map(|origin| self.merge_class[origin.cell()]).collect();
         self.operator = operator;
         self.body = body;
-        self.state.states = BondStates::Cloud(words);
+        self.state.states = BondStates::new(words);
         [self.state.displacement, self.state.velocity] = moved;
         self.state.force = vec![P::Field::default(); self.state.displacement.len()];
         self.generation += 1;

@@ -28,11 +28,12 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L> {
     /// Silling & Askari (2005), by a Gershgorin bound on the spectral radius: never too large for a linear body, and
     /// for stretches far below one not too large for a nonlinear one either.
     fn stable_step(&self, on: &mut On<'_, D>, density: f64) -> f64 {
-        let stiffest = match (&on.body.families, &on.operator.weights) {
-            (Families::Lattice(families), BondWeights::Lattice(weights)) => {
-                families.offsets.iter().zip(weights).map(|(o, w)| self.0.tangent(o.length, *w)).sum::<f64>()
+        let weights = &on.operator.weights;
+        let stiffest = match &on.body.families {
+            Families::Lattice(families) => {
+                families.offsets.iter().zip(&weights.by_offset).map(|(o, w)| self.0.tangent(o.length, *w)).sum::<f64>()
             }
-            (_, weights) => {
+            Families::Cloud(_) => {
                 let mut spring = vec![0.0; on.body.cloud.n_slots()];
                 let (whole, kernel) = (BondStates::whole(on.body), Tangent(self.0));
                 on.exec.sum_bonds::<D, 0, 1, Double>(on.body, weights, &whole, [], [&mut spring], &kernel);
