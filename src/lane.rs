@@ -15,6 +15,13 @@ pub trait Lane: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Se
     fn sqrt(self) -> Self;
     /// self × factor + term; rounded once where the loops run on fused instructions, twice elsewhere.
     fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// In each lane `above` where self > limit, else `below`: a law has no `if` on numbers. A NaN is not above.
+    fn select_above(self, limit: Self, above: Self, below: Self) -> Self;
+    /// The larger of two numbers in each lane.
+    #[inline(always)]
+    fn or_larger(self, other: Self) -> Self {
+        self.select_above(other, self, other)
+    }
 }
 
 impl Lane for f64 {
@@ -30,6 +37,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
         self * factor + term
+    }
+    #[inline(always)]
+    fn select_above(self, limit: Self, above: Self, below: Self) -> Self {
+        if self > limit { above } else { below }
     }
 }
 

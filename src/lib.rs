@@ -24,6 +24,7 @@ pub mod field;
 pub mod geometry;
 pub mod lane;
 pub mod output;
+pub mod parallel;
 pub mod physics;
 pub mod problem;
 pub mod refinement;

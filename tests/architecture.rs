@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules by level; a module may import its own and lower levels only (see ARCHITECTURE.md).
 const LEVELS: [&[&str]; 11] = [
-    &["field", "lane", "expression", "unknown", "visit"],
+    &["field", "lane", "expression", "parallel", "unknown", "visit"],
     &["geometry"],
     &["family", "refinement"],
     &["discretization"],

@@ -46,7 +46,7 @@ fn model<const D: usize, L: BondLaw<D>>(
     let body = standard::body(cloud, 3.0 * SPACING, rule);
     // E = 1 in units that do not matter: forces are compared with each other.
     let operator = Operator::standard(&body, 1.0, influence, rule);
-    let held = Held::new(&body, operator, Box::new(Bonds(law)), 1.0, failure);
+    let held = Held::new(&body, operator, Box::new(Bonds::new(law)), 1.0, failure);
     (body, held)
 }
 

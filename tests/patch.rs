@@ -45,7 +45,7 @@ impl<const D: usize, L: BondLaw<D>> Specimen<D, L> {
         let body = standard::body(cloud, horizon, rule);
         let strength = micromodulus(hypothesis, &influence, YOUNG, horizon);
         let operator = Operator::standard(&body, strength, influence, rule);
-        let physics = Held::new(&body, operator, Box::new(Bonds(law)), DENSITY, None);
+        let physics = Held::new(&body, operator, Box::new(Bonds::new(law)), DENSITY, None);
         Specimen { label, body, law: std::marker::PhantomData, physics, influence, rule, hypothesis }
     }
 

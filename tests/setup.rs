@@ -46,7 +46,7 @@ fn set_up(rule: PartialVolume, mut positions: Vec<[f64; 3]>, shuffle: bool) {
     let body = timed("families", || standard::body(cloud, 3.015, rule));
     let operator = timed("weights", || Operator::standard(&body, 1.0, Influence::Constant, rule));
     let mut physics: Elasticity<3> =
-        timed("states and volumes", || Elasticity::new(body, operator, Box::new(Bonds(BondBased)), 1.0, None));
+        timed("states and volumes", || Elasticity::new(body, operator, Box::new(Bonds::new(BondBased)), 1.0, None));
     std::hint::black_box(timed("stable step", || physics.stable_step()));
     let n = physics.body.cloud.n_slots();
     for slot in 0..n {

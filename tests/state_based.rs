@@ -246,7 +246,7 @@ fn damage<const D: usize, L: Stretch<D>>(s: &Specimen<D, L>, state: &mut State, 
     let mut broken = 0;
     for word in 0..state.states.words().len() {
         for bit in (0..16).filter(|bit| state.states.words()[word] >> bit & 1 == 1).collect::<Vec<_>>() {
-            let [a, b] = state.states.ends(&s.body, 16 * word + bit).map(|slot| slot as u64);
+            let [a, b] = s.body.ends_of(16 * word + bit).map(|slot| slot as u64);
             if (a.min(b) * 7919 + a.max(b) * 104_729).is_multiple_of(every) {
                 state.states.words_mut()[word] &= !(1 << bit);
                 broken += 1;
@@ -618,7 +618,7 @@ fn at_the_ratio_of_bonds_it_is_the_bond_based_law() {
             let strength = micromodulus(hypothesis, &influence, YOUNG, s.body.horizon);
             assert!((s.moduli.strength(&influence, s.body.horizon) / strength - 1.0).abs() < 1e-14);
             let operator = Operator::standard(&s.body, strength, influence, rule);
-            let bonds = Held::new(&s.body, operator, Box::new(Bonds(law)), DENSITY, None);
+            let bonds = Held::new(&s.body, operator, Box::new(Bonds::new(law)), DENSITY, None);
             let mut random = Random::new(9);
             let mut state = s.displaced(|_, _| random.vector(1e-2 * SPACING));
             let solid = s.physics.stable_step();

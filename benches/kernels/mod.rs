@@ -129,7 +129,7 @@ fn on_body<const D: usize, L: Stretch<D> + 'static, P: Packs>(
     let material: Box<dyn Material<D, P>> = if what == What::TwoPasses {
         Box::new(LinearSolid::new(law, solid, &body, &operator.weights))
     } else {
-        Box::new(Bonds(law))
+        Box::new(Bonds::new(law))
     };
     let mut elasticity = Elasticity::new(body, operator, material, 1.0, failure);
     let Elasticity { body, state, .. } = &mut elasticity;

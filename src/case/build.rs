@@ -12,10 +12,7 @@ use std::time::Instant;
 use super::bundled;
 use super::check::check;
 use super::diagnostics::{Diagnostic, Severity};
-use super::model::{
-    self, Case, FieldName, InfluenceFunction, Motion, Output, PartialVolumes, Plane, Precision, Scheme,
-    SurfaceCorrection,
-};
+use super::model::{self, Case, Motion, Output, PartialVolumes, Plane, Precision, Scheme, SurfaceCorrection};
 use super::read::{Located, Source};
 use crate::conditions::initial;
 use crate::discretization::{Correction, Influence, Operator, PartialVolume, Scaling, standard};
@@ -33,11 +30,11 @@ use crate::output::schedule::Schedule;
 use crate::output::source::Facts;
 use crate::output::writer::Output as Written;
 use crate::physics::Physics;
-use crate::physics::elasticity::laws::{BondBased as NonlinearBonds, BondBasedLinear as LinearBonds};
-use crate::physics::elasticity::linear_solid::{LinearSolid, Moduli};
+use crate::physics::elasticity::laws::Law;
+use crate::physics::elasticity::linear_solid::Moduli;
 use crate::physics::elasticity::moduli::{self, Hypothesis};
 use crate::physics::elasticity::surface::{correction_by_energy, correction_by_volume, surface_effect};
-use crate::physics::elasticity::{Bonds, Elasticity, Material, On};
+use crate::physics::elasticity::{Elasticity, On};
 use crate::physics::failure::CriticalStretch;
 use crate::problem::Problem;
 use crate::simulation::{Leg, Model, Simulation, Stepper};
@@ -48,7 +45,7 @@ use crate::solver::statics::Method;
 use crate::solver::{Clock, RungeKutta, Solver, Statics, VelocityVerlet};
 use conditions::motion_name;
 pub use geometry::available_memory;
-use outputs::{name, names, schedule, style, tip_window};
+use outputs::{names, schedule, style, tip_window};
 
 /// How a case is to be run, beside what it says itself.
 #[derive(Debug, Clone, Default)]
@@ -110,29 +107,8 @@ impl<const D: usize> Builder<'_, D> {
         }
     }
 
-    /// The bonds of the law of the case.
-    fn bonds<P: Packs>(&self) -> Box<dyn Material<D, P>> {
-        if self.case.value.physics.elasticity.law.is_linear() {
-            Box::new(Bonds(LinearBonds))
-        } else {
-            Box::new(Bonds(NonlinearBonds))
-        }
-    }
-
-    /// The material of the case on a body.
-    fn material<P: Packs>(
-        &self,
-        solid: Option<Moduli>,
-        body: &Body<D>,
-        operator: &Operator,
-    ) -> Box<dyn Material<D, P>> {
-        let Some(moduli) = solid else { return self.bonds() };
-        let weights = &operator.weights;
-        if self.case.value.physics.elasticity.law.is_linear() {
-            Box::new(LinearSolid::new(LinearBonds, moduli, body, weights))
-        } else {
-            Box::new(LinearSolid::new(NonlinearBonds, moduli, body, weights))
-        }
+    fn law(&self) -> Law {
+        self.case.value.physics.elasticity.law.of()
     }
 
     fn source(&self) -> &Source {
@@ -154,7 +130,7 @@ impl<const D: usize> Builder<'_, D> {
             PartialVolumes::Ramp => PartialVolume::Ramp,
             PartialVolumes::Exact => PartialVolume::Exact,
         };
-        let influence = influence(&case.discretization.influence);
+        let influence = Influence::from(case.discretization.influence);
         let mut cloud = self.cloud(shape.as_ref(), rule)?;
         let horizon = self.horizon(&cloud)?;
         let hypothesis = match (D, parameters.plane) {
@@ -163,12 +139,8 @@ impl<const D: usize> Builder<'_, D> {
             (2, _) => Hypothesis::PlaneStress,
             _ => Hypothesis::Solid,
         };
-        let solid = case
-            .physics
-            .elasticity
-            .law
-            .is_state_based()
-            .then(|| Moduli::new(hypothesis, parameters.young, parameters.poisson.unwrap_or(0.0)));
+        let moduli = Moduli::new(hypothesis, parameters.young, parameters.poisson.unwrap_or(0.0));
+        let solid = self.law().is_state_based().then_some(moduli);
         let strength = match &solid {
             Some(solid) => solid.strength(&influence, horizon),
             None => moduli::micromodulus(hypothesis, &influence, parameters.young, horizon),
@@ -186,7 +158,7 @@ impl<const D: usize> Builder<'_, D> {
             if adaptation.criteria.is_some() {
                 let operator = Operator::standard(&lattice, strength, influence, rule);
                 let mut on = On { body: &lattice, operator: &operator, failure: None, exec: &mut Exec::default() };
-                let step = self.bonds::<P>().stable_step(&mut on, parameters.density);
+                let step = self.law().bonds::<D, P>().stable_step(&mut on, parameters.density);
                 finest_step = step / f64::from(1u32 << adaptation.cells.levels);
             }
         }
@@ -243,7 +215,7 @@ impl<const D: usize> Builder<'_, D> {
             Scheme::Hybrid(settings) => Some(settings),
             Scheme::Standard => None,
         };
-        let material = self.material::<P>(solid, &body, &operator);
+        let material = self.law().material::<D, P>(&moduli, &body, &operator.weights);
         let mut elasticity = Elasticity::new(body, operator, material, parameters.density, failure);
         if settings.is_some_and(|settings| settings.rescale) {
             hybrid::rescale(&mut elasticity, &scaling);
@@ -311,7 +283,7 @@ impl<const D: usize> Builder<'_, D> {
         match self.case.value.discretization.surface_correction {
             SurfaceCorrection::None => None,
             SurfaceCorrection::Volume => Some(correction_by_volume(&mut on, scaling)),
-            SurfaceCorrection::Energy => Some(correction_by_energy(&*self.bonds::<P>(), &mut on, scaling)),
+            SurfaceCorrection::Energy => Some(correction_by_energy(&*self.law().bonds::<D, P>(), &mut on, scaling)),
         }
     }
 
@@ -333,7 +305,7 @@ impl<const D: usize> Builder<'_, D> {
                 Output::Vtu(vtu) => {
                     let schedule = schedule(vtu.every, vtu.every_steps, &[]);
                     self.files(&schedule, n_steps, dt, &format!("output[{k}].vtu"))?;
-                    let fields = names(&vtu.fields, &[FieldName::Displacement, FieldName::Damage]);
+                    let fields = names(&vtu.fields, &["displacement", "damage"]);
                     outputs.push(Written { schedule, writer: Box::new(Frames::new(folder, fields)) });
                 }
                 Output::Picture(picture) => {
@@ -345,7 +317,7 @@ impl<const D: usize> Builder<'_, D> {
                     self.files(&schedule, n_steps, dt, &format!("output[{k}].picture"))?;
                     let pictures = Pictures {
                         folder: folder.clone(),
-                        field: name(picture.field),
+                        field: picture.field.name(),
                         component: picture.component,
                         deform: picture.deform,
                         above: picture.above,
@@ -355,7 +327,7 @@ impl<const D: usize> Builder<'_, D> {
                 }
                 Output::History(history) => every = history.every_steps,
                 Output::Probe(probe) => {
-                    let fields = names(&probe.fields, &[FieldName::Displacement, FieldName::Velocity]);
+                    let fields = names(&probe.fields, &["displacement", "velocity"]);
                     let path = folder.join(format!("probe_{}.csv", probe.name));
                     let mut at = [0.0; 3];
                     at[..D].copy_from_slice(&probe.at);
@@ -463,19 +435,6 @@ fn linear_solver(statics: &model::Statics) -> LinearSolver {
         model::Preconditioner::None => Preconditioning::None,
     };
     LinearSolver { method, preconditioner, max_iterations: statics.max_linear }
-}
-
-fn influence(influence: &InfluenceFunction) -> Influence {
-    match *influence {
-        InfluenceFunction::Constant => Influence::Constant,
-        InfluenceFunction::Linear => Influence::Linear,
-        InfluenceFunction::Inverted => Influence::Inverted,
-        InfluenceFunction::Parabolic => Influence::Parabolic,
-        InfluenceFunction::Gaussian { width } => Influence::Gaussian { width },
-        InfluenceFunction::Cubic => Influence::Cubic,
-        InfluenceFunction::Quintic => Influence::Quintic,
-        InfluenceFunction::Septic => Influence::Septic,
-    }
 }
 
 /// Reads and builds a case file, or the `case.toml` of a folder.

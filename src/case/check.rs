@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::diagnostics::Diagnostic;
 use super::model::{
-    Case, Crack, CriticalStretch, FailurePair, Hybrid, Law, LinearSolver, Load, Motion, Output, Plane, Precision,
-    Region, Scheme, Shape, Solver, SurfaceCorrection,
+    Case, Crack, CriticalStretch, FailurePair, Hybrid, Law, LinearSolver, Load, Motion, Output, Plane, Region, Scheme,
+    Shape, Solver, SurfaceCorrection,
 };
 use super::read::{Located, Source};
 use crate::expression::nearest;
@@ -70,9 +70,9 @@ impl Checker<'_> {
             }
         }
         let elasticity = &case.physics.elasticity;
-        let path = format!("physics.elasticity.law.{}", elasticity.law.name());
+        let path = format!("physics.elasticity.law.{}", elasticity.law.of().name());
         self.law(&elasticity.law, dimension, &path);
-        if elasticity.law.is_state_based() {
+        if elasticity.law.of().is_state_based() {
             self.state_based(case);
         }
         if let Some(super::model::Failure::CriticalStretch(failure)) = &elasticity.failure {
@@ -414,7 +414,7 @@ impl Checker<'_> {
                 "remove it",
             );
         }
-        if kind.is_state_based() {
+        if kind.of().is_state_based() {
             return self.poisson(law.poisson, law.plane, dimension, path);
         }
         if let Some(poisson) = law.poisson {
@@ -468,10 +468,6 @@ impl Checker<'_> {
     /// What state-based laws cannot do.
     fn state_based(&mut self, case: &Case) {
         let bonds = "use a bond-based law, or remove it";
-        if case.discretization.precision != Precision::Double {
-            let message = "the state-based law is computed in double precision only";
-            self.error("discretization.precision", message, "use `double`");
-        }
         if case.discretization.surface_correction != SurfaceCorrection::None {
             let message = "the state-based law has no surface correction: each family has a weighted volume of its own";
             self.error("discretization.surface_correction", message, bonds);

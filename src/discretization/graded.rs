@@ -51,7 +51,7 @@ impl Scaling {
     /// A body with these horizons.
     pub fn body<const D: usize>(&self, cloud: Cloud<D>, grading: Grading) -> Body<D> {
         let (reach, ends) = (self.reach::<D>(&grading), grading.clone());
-        Body::graded(cloud, grading, reach, |i, j, xi| self.touches(ends.rule, ends.end(i), ends.end(j), xi))
+        Body::graded(cloud, grading, reach, &|i, j, xi| self.touches(ends.rule, ends.end(i), ends.end(j), xi))
     }
 
     /// The body with other points; see [`Body::replaced`].
@@ -64,8 +64,8 @@ impl Scaling {
     ) -> (Body<D>, Update) {
         let before = body.grading.as_ref().map_or(0.0, |grading| self.reach::<D>(grading));
         let (reach, ends) = (self.reach::<D>(&grading).max(before), grading.clone());
-        let touches = |i, j, xi: &Vector<D>| self.touches(ends.rule, ends.end(i), ends.end(j), xi);
-        body.replaced(cloud, grading, same, reach, touches)
+        let touches = |i: usize, j: usize, xi: &Vector<D>| self.touches(ends.rule, ends.end(i), ends.end(j), xi);
+        body.replaced(cloud, grading, same, reach, &touches)
     }
 
     /// The largest distance of any two neighbours, m.

@@ -10,7 +10,8 @@
 
 use super::volume::RIM_TOLERANCE;
 
-/// Influence function ω(t), t = |ξ|/δ, without unit.
+/// The list of influence functions ω(t), t = |ξ|/δ: variant, name in a case, and its parameter with default, least and
+/// most, if it has one. The formulas stand below; the case language, `list`, documentation and tests follow the list.
 ///
 /// | variant | ω(t) for t ≤ 1 | remark |
 /// |---|---|---|
@@ -22,59 +23,61 @@ use super::volume::RIM_TOLERANCE;
 /// | `Cubic` | 1 − 3t² + 2t³ | slope 0 at both ends |
 /// | `Quintic` | 1 − 10t³ + 15t⁴ − 6t⁵ | two derivatives 0 at both ends |
 /// | `Septic` | 1 − 35t⁴ + 84t⁵ − 70t⁶ + 20t⁷ | three derivatives 0 at both ends |
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Influence {
-    /// ω = 1
-    Constant,
-    /// ω = 1 − t
-    Linear,
-    /// ω = t
-    Inverted,
-    /// ω = 1 − t²
-    Parabolic,
-    /// ω = exp(−(t/width)²)
-    Gaussian {
-        /// Standard width in units of the horizon; must be positive.
-        width: f64,
-    },
-    /// ω = 1 − 3t² + 2t³
-    Cubic,
-    /// ω = 1 − 10t³ + 15t⁴ − 6t⁵
-    Quintic,
-    /// ω = 1 − 35t⁴ + 84t⁵ − 70t⁶ + 20t⁷
-    Septic,
+macro_rules! each_influence {
+    ($with:ident) => {
+        $with! {
+            /// 1
+            Constant "constant" {},
+            /// 1 − t (conical)
+            Linear "linear" {},
+            /// t
+            Inverted "inverted" {},
+            /// 1 − t²
+            Parabolic "parabolic" {},
+            /// exp(−(t/width)²)
+            Gaussian "gaussian" { width: 1.0 / 3.0, 0.05, 10 },
+            /// 1 − 3t² + 2t³
+            Cubic "cubic" {},
+            /// 1 − 10t³ + 15t⁴ − 6t⁵
+            Quintic "quintic" {},
+            /// 1 − 35t⁴ + 84t⁵ − 70t⁶ + 20t⁷
+            Septic "septic" {},
+        }
+    };
 }
+pub(crate) use each_influence;
+
+macro_rules! define {
+    ($(
+        $(#[doc = $about:literal])* $name:ident $key:literal
+        { $($parameter:ident: $default:expr, $least:literal, $most:literal)? },
+    )*) => {
+        #[doc = "Influence function ω(t), t = |ξ|/δ, without unit: one of the list."]
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Influence {
+            $($(#[doc = $about])* $name $({
+                /// In units of the horizon; must be positive.
+                $parameter: f64,
+            })?,)*
+        }
+
+        impl Influence {
+            /// Every influence function once, each parameter at its default.
+            pub const ALL: [Influence; [$($key),*].len()] = [$(Influence::$name $({ $parameter: $default })?,)*];
+
+            /// Name in case files and lists.
+            pub fn name(&self) -> &'static str {
+                match self { $(Influence::$name { .. } => $key,)* }
+            }
+        }
+    };
+}
+each_influence!(define);
 
 impl Influence {
     /// Default width of the Gaussian: a third of the horizon, so that the cut at the rim (e⁻⁹ =
     /// 1.2e-4) is small while the bell still spans a full spacing at a horizon ratio of 3.
     pub const GAUSSIAN_WIDTH: f64 = 1.0 / 3.0;
-
-    /// Every influence function once, the Gaussian with its default width.
-    pub const ALL: [Influence; 8] = [
-        Influence::Constant,
-        Influence::Linear,
-        Influence::Inverted,
-        Influence::Parabolic,
-        Influence::Gaussian { width: Self::GAUSSIAN_WIDTH },
-        Influence::Cubic,
-        Influence::Quintic,
-        Influence::Septic,
-    ];
-
-    /// Name in case files and lists.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Influence::Constant => "constant",
-            Influence::Linear => "linear",
-            Influence::Inverted => "inverted",
-            Influence::Parabolic => "parabolic",
-            Influence::Gaussian { .. } => "gaussian",
-            Influence::Cubic => "cubic",
-            Influence::Quintic => "quintic",
-            Influence::Septic => "septic",
-        }
-    }
 
     /// ω(t) with its support: zero for t > 1.
     ///

@@ -1,11 +1,10 @@
 //! The bonds one by one, as blocks of a matrix: what a tangent is assembled from.
 
-use rayon::prelude::*;
-
 use super::Exec;
 use crate::discretization::BondWeights;
 use crate::family::{Body, Bond, BondStates};
 use crate::field::norm;
+use crate::parallel;
 
 /// The bonds of a point that hold: the slots of x′, ascending, and a matrix for each.
 pub type BlockRow<const D: usize> = Vec<(u32, [[f64; D]; D])>;
@@ -31,6 +30,6 @@ impl Exec {
             row.sort_unstable_by_key(|(there, _)| *there);
             row
         };
-        (0..body.cloud.n_slots()).into_par_iter().map(row).collect()
+        parallel::map(body.cloud.n_slots(), &row)
     }
 }

@@ -10,7 +10,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::packs::{Between, Ends, Instructions, Pack, Packs, SiteView};
-use super::{BreakRule, Broken, SharedSlice, StatesPointer};
+use super::{BreakRule, Broken, Memory, SharedSlice, StatesPointer};
 use crate::discretization::standard::{CloudWeights, Profile};
 use crate::family::{Bond, BondKernel, CloudFamilies, GROUP};
 use crate::field::Number;
@@ -52,6 +52,7 @@ pub struct Sum<'a, const D: usize, const I: usize, const A: usize, const O: usiz
     pub states: StatesPointer,
     /// The input values of a point side by side, and behind them those that are added, as [`gather_input`] puts them.
     pub input: &'a [[P::Field; 4]],
+    pub memory: Memory<P::Bond>,
     pub output: [SharedSlice<P::Field>; O],
     pub kernel: &'a K,
 }
@@ -87,11 +88,17 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     /// # Safety
     /// As of [`Sum::sum`].
     unsafe fn small(&self, point: usize) -> f64 {
-        unsafe { if self.profile.plain { self.sum::<true, true>(point) } else { self.sum::<true, false>(point) } }
+        unsafe {
+            if K::EVERY_STEP && self.profile.plain {
+                self.sum::<true, true>(point)
+            } else {
+                self.sum::<true, false>(point)
+            }
+        }
     }
 
-    compiled!(sum, sum_on, sum_avx2, sum_avx512, [with SMALL: bool, PLAIN: bool], (point: usize), f64);
-    compiled!(break_bonds, break_on, break_avx2, break_avx512, [rule R: BreakRule<D>], (point: usize, rule: &R), Broken);
+    compiled!(sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP, [with SMALL: bool, PLAIN: bool], (point: usize), f64);
+    compiled!(break_bonds, break_on, break_avx2, break_avx512 if false, [rule R: BreakRule<D>], (point: usize, rule: &R), Broken);
 
     /// Sums one family into the output, in the small or the exact form, with `PLAIN` weights or any; returns the largest |strain| of its whole bonds.
     #[inline(always)]
@@ -109,9 +116,20 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             }
             for part in 0..GROUP / V::LANES {
                 let mask = word >> (part * V::LANES);
-                let (bond, relative, added) = unsafe { self.bond::<V, PLAIN>(point, group, part, &here, mask) };
+                let (mut bond, relative, added) = unsafe { self.bond::<V, PLAIN>(point, group, part, &here, mask) };
                 let strain = self.kernel.strain(&bond, &relative);
                 watch = watch.larger(strain);
+                if K::MEMORY {
+                    // SAFETY: `Exec` has checked that there is a number for each bit; those of a point are its own.
+                    unsafe {
+                        let at = self.memory.numbers.0.add(group * GROUP + part * V::LANES);
+                        bond.memory = V::load(at);
+                        bond.memory = self.kernel.remember(&bond, strain);
+                        if self.memory.keeps {
+                            bond.memory.put(at);
+                        }
+                    }
+                }
                 let sum = &mut sums[part];
                 let start = if K::RELATIVE { *sum } else { [V::splat(0.0); O] };
                 let mut value = if SMALL {
@@ -167,7 +185,11 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                     if *word >> k & 1 == 1 && strain > threshold && rule.breaks(point, there, strain) {
                         *word &= !(1 << k);
                         let xi = std::array::from_fn(|d| bond.xi[d].lane(lane));
-                        let bond = Bond::new(xi, bond.length.lane(lane), bond.weight.lane(lane));
+                        let mut bond = Bond::new(xi, bond.length.lane(lane), bond.weight.lane(lane));
+                        if K::MEMORY {
+                            // SAFETY: as above.
+                            bond.memory = unsafe { *self.memory.numbers.0.add(group * GROUP + k) }.to_f64();
+                        }
                         broken.bonds += 1;
                         broken.energy += self.families.sites.records[point][3] * rule.released(&bond, point, there);
                     }
@@ -287,7 +309,8 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         let inverse = square.inverse_root();
         let length = square * inverse;
         let weight = self.weigh::<V, PLAIN>(first, length, volume);
-        let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring: weight * inverse };
+        let (spring, memory) = (weight * inverse, V::splat(0.0));
+        let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring, memory };
         let (mut relative, mut added) = ([V::splat(0.0); I], [V::splat(0.0); A]);
         for part in 0..(I + A).div_ceil(4) {
             let there = unsafe { V::gather(self.input.as_ptr().add(part * self.n_points()), index) };

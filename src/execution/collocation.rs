@@ -6,8 +6,6 @@
 mod fused;
 mod slopes;
 
-use rayon::prelude::*;
-
 pub use fused::Motion;
 
 use super::packs::{Ends, Instructions, Pack, Packs};
@@ -19,6 +17,7 @@ use crate::field::Number;
 use crate::geometry::lattice::BLOCK;
 use crate::geometry::{Arrangement, Lattice};
 use crate::lane::Lane;
+use crate::parallel;
 
 /// How far a point with a row may be strained.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -183,19 +182,19 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// Does something with the first slot of each block; gives the slots whose bits it returns.
     fn each(&self, blocks: &[u32], work: impl Fn(usize) -> u16 + Sync) -> Vec<u32> {
-        let chunks = blocks.par_chunks(CHUNK).map(|blocks| {
+        let chunk = |k: usize| {
             let mut found = Vec::new();
-            for &block in blocks {
+            for &block in &blocks[k * CHUNK..((k + 1) * CHUNK).min(blocks.len())] {
                 let slot = self.lattice.guard + block as usize * BLOCK;
                 fused::note(&mut found, slot, work(slot));
             }
             found
-        });
-        chunks.collect::<Vec<_>>().concat()
+        };
+        parallel::map(blocks.len().div_ceil(CHUNK), &chunk).concat()
     }
 
-    compiled!(force, force_on, force_avx2, force_avx512, [], (slot: usize), u16);
-    compiled!(energy, energy_on, energy_avx2, energy_avx512, [], (slot: usize), ());
+    compiled!(force, force_on, force_avx2, force_avx512 if true, [], (slot: usize), u16);
+    compiled!(energy, energy_on, energy_avx2, energy_avx512 if true, [], (slot: usize), ());
 
     /// The row at the points of one block; gives the bits of those that are strained too far.
     #[inline(always)]

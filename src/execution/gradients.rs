@@ -1,10 +1,9 @@
 //! What is asked of a body now and then, bond by bond: gradients by least squares, and the largest of some value of bonds.
 //! Not for the inside of a loop over time.
 
-use rayon::prelude::*;
-
 use crate::family::{Body, Bond, BondStates};
 use crate::field::{Number, Vector, dot, norm};
+use crate::parallel;
 
 /// ∇f at `slots` for each of some fields: the g that minimises Σ V′ (g·ξ − Δf)²/|ξ|⁶ over the bonds that hold.
 /// Exact for linear fields. Zero where the bonds that are left do not span space. The nearest points count for nearly all,
@@ -15,8 +14,8 @@ pub fn gradients<const D: usize, const N: usize, T: Number>(
     fields: [&[T]; N],
     slots: &[u32],
 ) -> Vec<[Vector<D>; N]> {
-    let gradient = |&slot: &u32| {
-        let slot = slot as usize;
+    let gradient = |k: usize| {
+        let slot = slots[k] as usize;
         let (mut shape, mut right) = ([[0.0; D]; D], [[0.0; D]; N]);
         for (bit, there) in body.bonds_of(slot).filter(|(bit, _)| states.holds(*bit)) {
             let xi = body.xi(bit, slot, there);
@@ -32,7 +31,7 @@ pub fn gradients<const D: usize, const N: usize, T: Number>(
         }
         right.map(|right| solved(shape, right).unwrap_or([0.0; D]))
     };
-    slots.par_iter().map(gradient).collect()
+    parallel::map(slots.len(), &gradient)
 }
 
 /// The largest `value(bond, relative values, x, x′)` of the bonds of each point that hold; zero where there is none.
@@ -51,7 +50,7 @@ pub fn largest<const D: usize, T: Number>(
         }
         most
     };
-    (0..body.cloud.n_slots()).into_par_iter().map(largest).collect()
+    parallel::map(body.cloud.n_slots(), &largest)
 }
 
 /// The smallest pivot, over the largest entry, of a shape that is told from a flat one.

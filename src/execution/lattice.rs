@@ -7,7 +7,7 @@
 //! breaks. The body of the loop is compiled for AVX-512, AVX2 and the baseline and chosen at run time.
 
 use super::packs::{Ends, Instructions, Pack, Packs};
-use super::{BreakRule, Broken, SharedSlice, StatesPointer};
+use super::{BreakRule, Broken, Memory, SharedSlice, StatesPointer};
 use crate::family::{Bond, BondKernel, LatticeFamilies};
 use crate::field::{Number, Precision};
 use crate::geometry::Lattice;
@@ -41,7 +41,7 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
     pub fn new(families: &'a LatticeFamilies<D>, weights: &'a [f64], within: Option<&'a [u32]>) -> Self {
         assert_eq!(weights.len(), families.offsets.len(), "one weight an offset");
         let rows = families.offsets.iter().zip(weights).map(|(offset, &weight)| {
-            let Bond { xi, length, inverse_square, weight, spring } = Bond::new(offset.xi, offset.length, weight);
+            let Bond { xi, length, inverse_square, weight, spring, .. } = Bond::new(offset.xi, offset.length, weight);
             Row {
                 shift: offset.shift,
                 xi: xi.map(B::from_f64),
@@ -82,6 +82,7 @@ pub struct Sum<'a, const D: usize, const I: usize, const A: usize, const O: usiz
     pub states: StatesPointer,
     pub input: [&'a [P::Field]; I],
     pub added: [&'a [P::Field]; A],
+    pub memory: Memory<P::Bond>,
     pub output: [SharedSlice<P::Field>; O],
     pub kernel: &'a K,
 }
@@ -118,9 +119,9 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         broken
     }
 
-    compiled!(sum, sum_on, sum_avx2, sum_avx512, [with SMALL: bool], (words: &[u16], slot: usize), f64);
+    compiled!(sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP, [with SMALL: bool], (words: &[u16], slot: usize), f64);
     compiled!(
-        break_bonds, break_on, break_avx2, break_avx512,
+        break_bonds, break_on, break_avx2, break_avx512 if false,
         [rule R: BreakRule<D>], (words: &mut [u16], slot: usize, rule: &R), Broken
     );
 
@@ -145,12 +146,20 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                     for _ in 0..class.members {
                         // SAFETY: classes are ranges of offsets, and words and rows have one entry an offset.
                         unsafe {
-                            let bond = self.bond::<V>(k);
+                            let mut bond = self.bond::<V>(k);
                             let mask = *words.get_unchecked(k) >> (part * V::LANES);
                             let relative = self.relative::<V, I>(&self.input, k, first, &here, mask);
                             let added = self.relative::<V, A>(&self.added, k, first, &own, mask);
                             let strain = self.kernel.strain(&bond, &relative);
                             watch = watch.larger(strain);
+                            if K::MEMORY {
+                                let at = self.memory_of(k, first);
+                                bond.memory = V::load(at);
+                                bond.memory = self.kernel.remember(&bond, strain);
+                                if self.memory.keeps {
+                                    bond.memory.put(at);
+                                }
+                            }
                             let start = if K::RELATIVE { sum } else { [V::splat(0.0); O] };
                             let mut value = if SMALL {
                                 self.kernel.add_small(&bond, &relative, &added, strain, start)
@@ -216,7 +225,11 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                     if *word & bit != 0 && strain > threshold && rule.breaks(here, there, strain) {
                         *word &= !bit;
                         broken.bonds += 1;
-                        let bond = Bond::new(offset.xi, offset.length, self.view.weights[k]);
+                        let mut bond = Bond::new(offset.xi, offset.length, self.view.weights[k]);
+                        if K::MEMORY {
+                            // SAFETY: as of the slots of the block.
+                            bond.memory = unsafe { *self.memory_of(k, here) }.to_f64();
+                        }
                         broken.energy += volume * rule.released(&bond, here, there);
                     }
                 }
@@ -263,6 +276,15 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         relative
     }
 
+    /// Where the number of the bond along offset `k` of a slot stands: in the order of the states, a number for each bit.
+    #[inline(always)]
+    unsafe fn memory_of(&self, k: usize, slot: usize) -> *mut P::Bond {
+        let block = (slot - self.view.lattice.guard) / BLOCK;
+        let bit = (block * self.view.families.offsets.len() + k) * BLOCK + slot % BLOCK;
+        // SAFETY: `Exec` has checked that there is a number for each bit.
+        unsafe { self.memory.numbers.0.add(bit) }
+    }
+
     #[inline(always)]
     unsafe fn bond<V: Pack<P::Bond>>(&self, k: usize) -> Bond<D, V> {
         let row = unsafe { self.view.rows.get_unchecked(k) };
@@ -276,6 +298,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             inverse_square: V::broadcast(row.inverse_square),
             weight: V::broadcast(row.weight),
             spring: V::broadcast(row.spring),
+            memory: V::splat(0.0),
         }
     }
 }

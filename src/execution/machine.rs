@@ -103,7 +103,7 @@ struct Chains<P: Precision> {
 const REGISTERS: usize = 12;
 
 impl<P: Packs> Chains<P> {
-    compiled!(run, run_on, run_avx2, run_avx512, [], (rounds: usize), f64);
+    compiled!(run, run_on, run_avx2, run_avx512 if true, [], (rounds: usize), f64);
 
     /// Runs `rounds` multiply-adds in each register; returns how many operations that were.
     #[inline(always)]

@@ -7,7 +7,7 @@
 /// calls the one that the machine has.
 macro_rules! compiled {
     (
-        $name:ident, $generic:ident, $avx2:ident, $avx512:ident,
+        $name:ident, $generic:ident, $avx2:ident, $avx512:ident if $widest:expr,
         [$(with $($n:ident: $type:ident),*)? $(rule $t:ident: $bound:path)?], ($($argument:ident: $of:ty),*), $returns:ty
     ) => {
         /// # Safety
@@ -22,9 +22,10 @@ macro_rules! compiled {
                 }
                 match self.instructions {
                     #[cfg(target_arch = "x86_64")]
-                    Instructions::Avx512 => self.$avx512::<$($($n),*)? $($t)?>($($argument),*),
+                    Instructions::Avx512 if $widest => self.$avx512::<$($($n),*)? $($t)?>($($argument),*),
+                    // Whatever has AVX-512 has AVX2, which fuses alike: the bits are the same.
                     #[cfg(target_arch = "x86_64")]
-                    Instructions::Avx2 => self.$avx2::<$($($n),*)? $($t)?>($($argument),*),
+                    Instructions::Avx512 | Instructions::Avx2 => self.$avx2::<$($($n),*)? $($t)?>($($argument),*),
                     Instructions::Baseline => self.$generic::<P::Baseline, $($($n),*)? $($t)?>($($argument),*),
                 }
             }
@@ -63,6 +64,7 @@ use rayon::prelude::*;
 use crate::discretization::BondWeights;
 use crate::family::{Body, Bond, BondKernel, BondStates, Families};
 use crate::field::Number;
+use crate::geometry::lattice::BLOCK;
 use crate::lane::Lane;
 use crate::visit::Visitor;
 pub use blocks::BlockRow;
@@ -206,7 +208,8 @@ impl Exec {
     ) {
         // SAFETY of the cast: with `Unbreakable` the loops never write to the states.
         let states = StatesPointer::shared(states);
-        self.each_path::<D, I, 0, O, P, _, _>(body, weights, states, (input, []), output, kernel, &Unbreakable);
+        let memory = Memory::none();
+        self.each_path::<D, I, 0, O, P, _, _>(body, weights, states, (input, []), memory, output, kernel, &Unbreakable);
     }
 
     /// The same with values that are added instead of subtracted.
@@ -223,7 +226,8 @@ impl Exec {
     ) {
         // SAFETY of the cast: as above.
         let states = StatesPointer::shared(states);
-        self.each_path::<D, I, A, O, P, _, _>(body, weights, states, (input, added), output, kernel, &Unbreakable);
+        let (input, memory) = ((input, added), Memory::none());
+        self.each_path::<D, I, A, O, P, _, _>(body, weights, states, input, memory, output, kernel, &Unbreakable);
     }
 
     /// As [`Exec::sum_bonds`], but bonds that `rule` breaks at these input values are broken first, at both ends.
@@ -239,7 +243,30 @@ impl Exec {
         rule: &impl BreakRule<D>,
     ) -> Broken {
         let states = StatesPointer::exclusive(states);
-        self.each_path::<D, I, 0, O, P, _, _>(body, weights, states, (input, []), output, kernel, rule)
+        self.each_path::<D, I, 0, O, P, _, _>(body, weights, states, (input, []), Memory::none(), output, kernel, rule)
+    }
+
+    /// The same of a kernel that keeps a number of each bond: `memory` has one for each bit of the states, and gets what
+    /// the kernel makes of it if `keeps`.
+    ///
+    /// # Panics
+    /// If there are fewer numbers.
+    #[allow(clippy::too_many_arguments)] // as above
+    pub fn sum_bonds_remembering<const D: usize, const I: usize, const O: usize, P: Packs>(
+        &mut self,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &mut BondStates,
+        input: [&[P::Field]; I],
+        (memory, keeps): (&mut [P::Bond], bool),
+        output: [&mut [P::Field]; O],
+        kernel: &impl BondKernel<D, I, O>,
+        rule: &impl BreakRule<D>,
+    ) -> Broken {
+        assert_eq!(memory.len(), BLOCK * body.n_words(), "a number for each bit");
+        let memory = Memory { numbers: SharedSlice(memory.as_mut_ptr()), keeps };
+        let states = StatesPointer::exclusive(states);
+        self.each_path::<D, I, 0, O, P, _, _>(body, weights, states, (input, []), memory, output, kernel, rule)
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -249,6 +276,7 @@ impl Exec {
         weights: &BondWeights,
         states: StatesPointer,
         (input, added): ([&[P::Field]; I], [&[P::Field]; A]),
+        memory: Memory<P::Bond>,
         output: [&mut [P::Field]; O],
         kernel: &K,
         rule: &R,
@@ -267,7 +295,16 @@ impl Exec {
             Families::Lattice(families) => {
                 let within = self.within.take();
                 let view = &lattice::View::new(families, &weights.by_offset, within.as_deref());
-                let sum = lattice::Sum::<D, I, A, O, P, _> { instructions, view, states, input, added, output, kernel };
+                let sum = lattice::Sum::<D, I, A, O, P, _> {
+                    instructions,
+                    view,
+                    states,
+                    input,
+                    added,
+                    memory,
+                    output,
+                    kernel,
+                };
                 let broken = if K::LINEAR && R::NEVER {
                     let sum = rows::Sum::new(&sum);
                     self.each_chunk(view.n_chunks(), &|chunk| {
@@ -294,6 +331,7 @@ impl Exec {
                     sites,
                     states,
                     input,
+                    memory,
                     output,
                     kernel,
                 };
@@ -331,6 +369,21 @@ struct SharedSlice<T>(*mut T);
 // SAFETY: what uses it gives each chunk its own slots to write, no slot to two chunks, and lets none be read meanwhile.
 unsafe impl<T: Number> Send for SharedSlice<T> {}
 unsafe impl<T: Number> Sync for SharedSlice<T> {}
+
+/// The numbers that a kernel keeps of bonds, one for each bit of the states.
+#[derive(Clone, Copy)]
+struct Memory<T> {
+    numbers: SharedSlice<T>,
+    /// Whether they change.
+    keeps: bool,
+}
+
+impl<T> Memory<T> {
+    /// Of kernels that keep nothing, which never look.
+    fn none() -> Self {
+        Memory { numbers: SharedSlice(std::ptr::null_mut()), keeps: false }
+    }
+}
 
 /// The words of the bond states, read by all chunks; each chunk writes only those of its own points.
 #[derive(Clone, Copy)]

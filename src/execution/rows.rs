@@ -69,7 +69,7 @@ impl<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Pack
         }
     }
 
-    compiled!(sum, sum_on, sum_avx2, sum_avx512, [], (slot: usize), ());
+    compiled!(sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP, [], (slot: usize), ());
 
     /// Applies the row at the points of one block; mirror images are added as in the sum over bonds.
     #[inline(always)]

@@ -15,12 +15,14 @@ pub struct Bond<const D: usize, L> {
     pub weight: L,
     /// weight/|ξ|
     pub spring: L,
+    /// What the law has noted of this bond, see [`BondLaw::MEMORY`]; zero where it notes nothing.
+    pub memory: L,
 }
 
 impl<const D: usize> Bond<D, f64> {
     /// One bond, from ξ (m), |ξ| (m) and its weight.
     pub fn new(xi: [f64; D], length: f64, weight: f64) -> Self {
-        Bond { xi, length, inverse_square: 1.0 / (length * length), weight, spring: weight / length }
+        Bond { xi, length, inverse_square: 1.0 / (length * length), weight, spring: weight / length, memory: 0.0 }
     }
 }
 
@@ -36,11 +38,24 @@ pub trait BondKernel<const D: usize, const I: usize, const O: usize, const A: us
     const SMALL: f64 = f64::INFINITY;
     /// Whether there are two forms: where there is one, the other is not compiled.
     const TWO_FORMS: bool = Self::SMALL < f64::INFINITY;
+    /// Whether it is summed in every step: then it is compiled for every set of instructions, and for plain weights apart.
+    /// What is summed now and then gets along without, with the same bits.
+    const EVERY_STEP: bool = false;
     /// Whether the summand is linear in the relative values and the same along −ξ as along ξ.
     const LINEAR: bool = false;
     /// Whether the summand is zero where the ends have the same values. Broken bonds are given as such, which saves
     /// a mask; the summands of other kernels are masked.
     const RELATIVE: bool = true;
+    /// Whether a number of each bond is kept from step to step.
+    const MEMORY: bool = false;
+
+    /// That number at the strain that the bond has now, from what it was (in `bond`): zero at the start. Again at the same
+    /// strain it must stay what it is.
+    #[inline(always)]
+    fn remember<L: Lane>(&self, bond: &Bond<D, L>, _strain: L) -> L {
+        bond.memory
+    }
+
     /// What decides about breaking and about the form: computed once, whichever form follows. `relative`: values at
     /// x′ less values at x. Nothing, unless the kernel says otherwise.
     #[inline(always)]
@@ -66,12 +81,25 @@ pub trait BondKernel<const D: usize, const I: usize, const O: usize, const A: us
 }
 
 /// A bond law of elasticity: what a bond does when its ends move apart. η = u′ − u, m.
+///
+/// At rest its spring constant, the derivative of the force along ξ by η along ξ, is weight/|ξ|: that is what makes the
+/// strength in the weight a micromodulus. Everything is linear in the weight.
 pub trait BondLaw<const D: usize>: Copy + Send + Sync + 'static {
     /// |strain| up to which the small forms serve; infinite where there is one form only.
     const SMALL: f64 = f64::INFINITY;
     /// Whether the force is linear in η.
     const LINEAR: bool = false;
 
+    /// Whether the law keeps a number of each bond, such as the largest strain that it has had: it is then `bond.memory`
+    /// of whatever the law is asked.
+    const MEMORY: bool = false;
+
+    /// That number at the strain that the bond has now, from what it was: zero at the start. Again at the same strain it
+    /// must stay what it is; and the same from both ends.
+    #[inline(always)]
+    fn remember<L: Lane>(&self, bond: &Bond<D, L>, _strain: L) -> L {
+        bond.memory
+    }
     /// How far the bond is strained, in the measure of this law: grows with the stretch, without rounding of its own
     /// where η is small. A bond breaks when this passes [`BondLaw::strain_at`] its critical stretch.
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L;
@@ -91,8 +119,6 @@ pub trait BondLaw<const D: usize>: Copy + Send + Sync + 'static {
     fn small_energy<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
         self.energy(bond, strain)
     }
-    /// Spring constant of the bond at rest, weighted: derivative of the force along ξ by η along ξ.
-    fn tangent<L: Lane>(&self, length: L, weight: L) -> L;
     /// ∂force/∂η, exactly: row by row the change of each component of the force, weighted.
     fn stiffness(&self, bond: &Bond<D, f64>, eta: &[f64; D]) -> [[f64; D]; D];
 }

@@ -146,7 +146,7 @@ impl<const D: usize> Body<D> {
                 Families::Lattice(LatticeFamilies::new(lattice, &cloud.slots, rim, accept))
             }
             Arrangement::Scattered { positions, volumes } => {
-                let mut families = search::families(positions, rim, |_, _, xi| accept(xi));
+                let mut families = search::families(positions, rim, &|_, _, xi| accept(xi));
                 families.sites = Sites::new(positions, volumes);
                 Families::Cloud(families)
             }
@@ -183,6 +183,22 @@ impl<const D: usize> Body<D> {
         match &self.families {
             Families::Lattice(families) => families.offsets[bit / BLOCK % families.offsets.len()].xi,
             Families::Cloud(_) => difference(&self.cloud.position(there), &self.cloud.position(here)),
+        }
+    }
+
+    /// The slots of x and x′ of the bond whose state is bit `bit % 16` of word `bit / 16`.
+    pub fn ends_of(&self, bit: usize) -> [usize; 2] {
+        match &self.families {
+            Families::Lattice(families) => {
+                let (word, n) = (bit / BLOCK, families.offsets.len());
+                let slot = families.lattice.guard + word / n * BLOCK + bit % BLOCK;
+                [slot, slot.wrapping_add_signed(families.offsets[word % n].shift)]
+            }
+            Families::Cloud(families) => {
+                let group = (bit / GROUP) as u64;
+                let point = families.starts.partition_point(|&start| start <= group) - 1;
+                [point, families.neighbours[bit] as usize]
+            }
         }
     }
 

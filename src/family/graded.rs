@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::families::{Body, CloudFamilies, Families, GROUP, PIECE, Sites};
-use super::search;
+use super::search::{self, Accept};
 use crate::field::{Vector, difference, norm};
 use crate::geometry::Cloud;
 
@@ -57,12 +57,7 @@ const NEW: u32 = u32::MAX;
 
 impl<const D: usize> Body<D> {
     /// A body whose horizons differ: the families hold every x′ within `reach` (m) for which `touches(x, x′, ξ)` holds.
-    pub fn graded(
-        cloud: Cloud<D>,
-        grading: Grading,
-        reach: f64,
-        touches: impl Fn(usize, usize, &Vector<D>) -> bool + Sync,
-    ) -> Self {
+    pub fn graded(cloud: Cloud<D>, grading: Grading, reach: f64, touches: &Accept<'_, D>) -> Self {
         let cloud = cloud.scattered_already();
         let (positions, volumes) = cloud.places();
         let mut families = search::families(&positions, 0.0..reach, touches);
@@ -79,7 +74,7 @@ impl<const D: usize> Body<D> {
         grading: Grading,
         same: &[u32],
         reach: f64,
-        touches: impl Fn(usize, usize, &Vector<D>) -> bool + Sync,
+        touches: &Accept<'_, D>,
     ) -> (Self, Update) {
         let Families::Cloud(old) = &self.families else {
             // Nothing of a lattice can be kept.

@@ -7,36 +7,32 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::families::{CloudFamilies, GROUP, PIECE, Sites};
 use super::tree::{Bounds, FAN, Tree};
 use crate::field::{Vector, difference, norm};
+use crate::parallel;
 
 /// Points whose candidates are collected together.
 const BLOCK: usize = FAN * FAN;
 /// Points whose families are kept twice for a moment.
 const WAVE: usize = 256 * PIECE;
 
+/// Whether x′ belongs to the family of x, given both slots and ξ.
+pub type Accept<'a, const D: usize> = dyn Fn(usize, usize, &Vector<D>) -> bool + Sync + 'a;
+
 /// The families of a scattered cloud: x′ ≠ x with |ξ| ≤ `rim.start`, or with |ξ| ≤ `rim.end` and `accept(x, x′, ξ)`, the
 /// first two by their places in `positions`; ascending.
-pub fn families<const D: usize>(
-    positions: &[Vector<D>],
-    rim: Range<f64>,
-    accept: impl Fn(usize, usize, &Vector<D>) -> bool + Sync,
-) -> CloudFamilies {
+pub fn families<const D: usize>(positions: &[Vector<D>], rim: Range<f64>, accept: &Accept<'_, D>) -> CloudFamilies {
     let search = Search { positions, tree: Tree::new(positions), rim, accept };
     let n = positions.len();
     let (mut starts, mut neighbours) = (Vec::with_capacity(n + 1), Vec::new());
     starts.push(0);
     for wave in (0..n).step_by(WAVE) {
         let end = (wave + WAVE).min(n);
-        let mut pieces: Vec<Piece> = Vec::new();
-        (wave..end)
-            .into_par_iter()
-            .step_by(PIECE)
-            .map_init(Scratch::default, |scratch, first| search.piece(first..(first + PIECE).min(end), scratch))
-            .collect_into_vec(&mut pieces);
+        let pieces = parallel::map_each((end - wave).div_ceil(PIECE), &|k| {
+            let first = wave + k * PIECE;
+            search.piece(first..(first + PIECE).min(end), &mut Scratch::default())
+        });
         let found: usize = pieces.iter().map(|piece| piece.neighbours.len()).sum();
         if neighbours.capacity() < neighbours.len() + found {
             // Room for all that the points so far let expect, so that a list of gigabytes is not doubled.
@@ -57,10 +53,10 @@ pub fn pieces<const D: usize>(
     positions: &[Vector<D>],
     ranges: Vec<Range<usize>>,
     rim: Range<f64>,
-    accept: impl Fn(usize, usize, &Vector<D>) -> bool + Sync,
+    accept: &Accept<'_, D>,
 ) -> Vec<Piece> {
     let search = Search { positions, tree: Tree::new(positions), rim, accept };
-    ranges.into_par_iter().map_init(Scratch::default, |scratch, range| search.piece(range, scratch)).collect()
+    parallel::map(ranges.len(), &|k| search.piece(ranges[k].clone(), &mut Scratch::default()))
 }
 
 /// The families of some consecutive points.
@@ -71,11 +67,11 @@ pub struct Piece {
 }
 
 /// What is searched, and for whom.
-struct Search<'a, const D: usize, F> {
+struct Search<'a, const D: usize> {
     positions: &'a [Vector<D>],
     tree: Tree<D>,
     rim: Range<f64>,
-    accept: F,
+    accept: &'a Accept<'a, D>,
 }
 
 /// Lists that grow once and are used again.
@@ -88,7 +84,7 @@ struct Scratch<const D: usize> {
     row: Vec<u32>,
 }
 
-impl<const D: usize, F: Fn(usize, usize, &Vector<D>) -> bool> Search<'_, D, F> {
+impl<const D: usize> Search<'_, D> {
     /// The families of `points`.
     fn piece(&self, points: Range<usize>, scratch: &mut Scratch<D>) -> Piece {
         let mut piece = Piece { ends: Vec::with_capacity(points.len()), neighbours: Vec::new() };
@@ -288,7 +284,7 @@ mod tests {
             panic!("a scattered cloud")
         };
         for (order, positions) in [("as given", positions), ("along the curve", along)] {
-            let found = families(&positions, rim.clone(), |_, _, xi| accept(xi));
+            let found = families(&positions, rim.clone(), &|_, _, xi| accept(xi));
             assert_eq!(found.starts.len(), n + 1);
             for (i, x) in positions.iter().enumerate() {
                 let is_neighbour = |&j: &u32| {
@@ -360,7 +356,7 @@ mod tests {
             else {
                 panic!("a scattered cloud")
             };
-            let found = pool.install(|| families(&positions, 0.004..0.005, |_, _, xi| xi[0] * xi[1] > 0.0));
+            let found = pool.install(|| families(&positions, 0.004..0.005, &|_, _, xi| xi[0] * xi[1] > 0.0));
             (found.starts, found.neighbours)
         };
         let one = found(1);

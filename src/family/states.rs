@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::{Body, CloudFamilies, Families, GROUP};
 use crate::geometry::Crack;
 use crate::geometry::lattice::BLOCK;
+use crate::parallel;
 
 /// One bit for each directed bond: of a lattice in `words[block * offsets + offset]`, of a cloud in `words[group of bonds]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -88,8 +89,9 @@ impl BondStates {
 
     /// Bonds of each point that hold, in point order.
     pub fn per_point<const D: usize>(&self, body: &Body<D>) -> Vec<u32> {
-        let count = |slot: &u32| body.bonds_of(*slot as usize).filter(|(bit, _)| self.holds(*bit)).count() as u32;
-        body.cloud.slots.par_iter().map(count).collect()
+        let slots = &body.cloud.slots;
+        let holds = |(bit, _): &(usize, usize)| self.holds(*bit);
+        parallel::map(slots.len(), &|k| body.bonds_of(slots[k] as usize).filter(holds).count() as u32)
     }
 
     /// The words.
@@ -104,22 +106,6 @@ impl BondStates {
     /// The same, to be shown and replaced.
     pub fn vector(&mut self) -> &mut Vec<u16> {
         &mut self.words
-    }
-
-    /// The slots of x and x′ of the bond whose state is bit `bit % 16` of word `bit / 16`.
-    pub fn ends<const D: usize>(&self, body: &Body<D>, bit: usize) -> [usize; 2] {
-        match &body.families {
-            Families::Lattice(families) => {
-                let (word, n) = (bit / BLOCK, families.offsets.len());
-                let slot = families.lattice.guard + word / n * BLOCK + bit % BLOCK;
-                [slot, slot.wrapping_add_signed(families.offsets[word % n].shift)]
-            }
-            Families::Cloud(families) => {
-                let group = (bit / GROUP) as u64;
-                let point = families.starts.partition_point(|&start| start <= group) - 1;
-                [point, families.neighbours[bit] as usize]
-            }
-        }
     }
 
     /// The words as bytes, for hashing and saving.
@@ -184,7 +170,7 @@ mod tests {
             let whole = BondStates::whole(body);
             let set = (0..16 * whole.words().len()).filter(|bit| whole.words()[bit / 16] >> (bit % 16) & 1 == 1);
             let ends = |bit| {
-                let [a, b] = whole.ends(body, bit).map(|slot| body.cloud.position(slot).map(f64::to_bits));
+                let [a, b] = body.ends_of(bit).map(|slot| body.cloud.position(slot).map(f64::to_bits));
                 if swapped { [b, a] } else { [a, b] }
             };
             let mut bonds: Vec<_> = set.map(ends).collect();

@@ -5,10 +5,9 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::{Lattice, PointSets, Shape, curve};
 use crate::field::Vector;
+use crate::parallel;
 
 /// How the points of a cloud lie.
 #[derive(Debug, Clone)]
@@ -64,8 +63,8 @@ impl<const D: usize> Cloud<D> {
         for (slot, &point) in order.iter().enumerate() {
             slots[point as usize] = slot as u32;
         }
-        let positions = order.par_iter().map(|&point| positions[point as usize]).collect();
-        let volumes = order.par_iter().map(|&point| volumes[point as usize]).collect();
+        let positions = parallel::map(order.len(), &|k| positions[order[k] as usize]);
+        let volumes = parallel::map(order.len(), &|k| volumes[order[k] as usize]);
         Cloud {
             arrangement: Arrangement::Scattered { positions, volumes },
             slots,

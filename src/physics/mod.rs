@@ -14,7 +14,9 @@ pub use diffusion::Diffusion;
 pub use elasticity::Elasticity;
 
 use crate::execution::Broken;
-use crate::field::Field;
+use crate::family::{Body, BondStates};
+use crate::field::{Field, embed};
+use crate::geometry::Arrangement;
 use crate::refinement::Remap;
 use crate::solver::Drift;
 use crate::solver::linear::{LinearError, Preconditioner, Sparse};
@@ -51,8 +53,14 @@ pub trait Physics: Send {
     fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field>;
     /// The points as they are now.
     fn points(&self) -> &dyn Points;
-    /// Bonds: which there are, and which hold.
-    fn bonds(&self) -> &dyn Bonds;
+    /// How often the points have been replaced.
+    fn generation(&self) -> u64 {
+        0
+    }
+    /// Which bonds hold.
+    fn states(&self) -> &BondStates;
+    /// Directed bonds before any broke, and how many pre-cracks cut.
+    fn n_bonds(&self) -> [u64; 2];
 
     /// Kinetic energy (J), and what is kept where nothing enters: momentum (N·s) or amount, by component.
     fn motion(&mut self) -> (f64, [f64; 3]);
@@ -126,6 +134,12 @@ pub struct FieldInfo {
     pub about: &'static str,
 }
 
+/// The fields of every physics, each name once.
+pub fn all_fields() -> impl Iterator<Item = &'static FieldInfo> {
+    let (first, second) = (elasticity::FIELDS, diffusion::FIELDS);
+    first.iter().chain(second.iter().filter(|field| first.iter().all(|other| other.name != field.name)))
+}
+
 /// The points of a body, whatever its dimension.
 pub trait Points {
     fn dimension(&self) -> usize;
@@ -141,22 +155,51 @@ pub trait Points {
     fn same_volume(&self) -> Option<f64>;
     /// m
     fn spacing(&self) -> f64;
-    /// m
+    /// δ, m; the largest where they differ.
     fn horizon(&self) -> f64;
-    /// How often the points have been replaced.
-    fn generation(&self) -> u64;
-}
-
-/// The bonds of a body.
-pub trait Bonds {
-    /// Directed bonds before any broke, and how many pre-cracks cut.
-    fn count(&self) -> [u64; 2];
     /// Bonds of each point that hold, in point order.
-    fn per_point(&self) -> Vec<u32>;
-    /// One bit for each, set while it holds.
-    fn words(&self) -> &[u16];
+    fn bonds_that_hold(&self, states: &BondStates) -> Vec<u32>;
     /// x and x′ (m) of the bond whose state is bit `bit % 16` of word `bit / 16`.
     fn ends(&self, bit: usize) -> [[f64; 3]; 2];
+}
+
+impl<const D: usize> Points for Body<D> {
+    fn dimension(&self) -> usize {
+        D
+    }
+    fn n_points(&self) -> usize {
+        self.cloud.n_points()
+    }
+    fn slots(&self) -> &[u32] {
+        &self.cloud.slots
+    }
+    fn n_slots(&self) -> usize {
+        self.cloud.n_slots()
+    }
+    fn position(&self, slot: usize) -> [f64; 3] {
+        embed(&self.cloud.position(slot))
+    }
+    fn volume(&self, slot: usize) -> f64 {
+        self.cloud.volume(slot)
+    }
+    fn same_volume(&self) -> Option<f64> {
+        match &self.cloud.arrangement {
+            Arrangement::Lattice(lattice) => Some(lattice.cell_volume()),
+            Arrangement::Scattered { .. } => None,
+        }
+    }
+    fn spacing(&self) -> f64 {
+        self.cloud.spacing
+    }
+    fn horizon(&self) -> f64 {
+        self.horizon
+    }
+    fn bonds_that_hold(&self, states: &BondStates) -> Vec<u32> {
+        states.per_point(self)
+    }
+    fn ends(&self, bit: usize) -> [[f64; 3]; 2] {
+        self.ends_of(bit).map(|slot| embed(&self.cloud.position(slot)))
+    }
 }
 
 /// What is in a body beside its motion.

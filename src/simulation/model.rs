@@ -36,14 +36,14 @@ impl Model {
     fn count(&mut self) {
         let physics = &self.problem.physics;
         self.facts.points = physics.points().n_points();
-        [self.facts.bonds, self.facts.cut_bonds] = physics.bonds().count();
+        [self.facts.bonds, self.facts.cut_bonds] = physics.n_bonds();
         self.facts.memory = physics.memory() as u64;
-        self.generation = physics.points().generation();
+        self.generation = physics.generation();
         self.points = OnceLock::new();
     }
 
     fn follow_points(&mut self) {
-        if self.generation != self.problem.points().generation() {
+        if self.generation != self.problem.physics.generation() {
             self.count();
         }
     }
@@ -91,13 +91,13 @@ impl Source for Model {
         self.problem.hash()
     }
     fn family_sizes(&self) -> Vec<u32> {
-        self.problem.physics.bonds().per_point()
+        self.problem.points().bonds_that_hold(self.problem.physics.states())
     }
     fn bond_words(&self) -> &[u16] {
-        self.problem.physics.bonds().words()
+        self.problem.physics.states().words()
     }
     fn bond_ends(&self, bit: usize) -> [[f64; 3]; 2] {
-        self.problem.physics.bonds().ends(bit)
+        self.problem.points().ends(bit)
     }
 }
 

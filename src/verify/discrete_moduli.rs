@@ -46,7 +46,7 @@ fn from_bond_sums<const D: usize>(hypothesis: Hypothesis, rule: PartialVolume, m
     let (body, middle) = block::<D>(rule, m);
     let strength = micromodulus(hypothesis, &influence, 1.0, m);
     let operator = Operator::standard(&body, strength, influence, rule);
-    let mut elasticity = Elasticity::<D>::new(body, operator, Box::new(Bonds(BondBasedLinear)), 1.0, None);
+    let mut elasticity = Elasticity::<D>::new(body, operator, Box::new(Bonds::new(BondBasedLinear)), 1.0, None);
     let mut energy = |strain: [f64; 2]| {
         let Elasticity { body, state, .. } = &mut elasticity;
         let n = body.cloud.n_slots();

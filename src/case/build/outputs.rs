@@ -55,18 +55,6 @@ pub(super) fn style(picture: &model::Picture, title: &str) -> Picture {
     }
 }
 
-pub(super) fn name(field: FieldName) -> &'static str {
-    match field {
-        FieldName::Displacement => "displacement",
-        FieldName::Velocity => "velocity",
-        FieldName::Force => "force",
-        FieldName::Damage => "damage",
-        FieldName::StrainEnergy => "strain_energy",
-        FieldName::Scheme => "scheme",
-    }
-}
-
-pub(super) fn names(fields: &[FieldName], default: &[FieldName]) -> Vec<&'static str> {
-    let fields = if fields.is_empty() { default } else { fields };
-    fields.iter().map(|&f| name(f)).collect()
+pub(super) fn names(fields: &[FieldName], default: &[&'static str]) -> Vec<&'static str> {
+    if fields.is_empty() { default.to_vec() } else { fields.iter().map(FieldName::name).collect() }
 }

@@ -3,6 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::discretization::Influence;
+use crate::discretization::influence::each_influence;
+
 use super::{Formula, Region};
 
 /// How the integral over the family becomes a sum.
@@ -111,30 +114,36 @@ fn six() -> f64 {
     6.0
 }
 
-/// Influence functions, t = |ξ|/δ.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum InfluenceFunction {
-    /// 1
-    #[default]
-    Constant,
-    /// 1 − t (conical)
-    Linear,
-    /// t
-    Inverted,
-    /// 1 − t²
-    Parabolic,
-    /// exp(−(t/width)²)
-    Gaussian {
-        #[schemars(range(min = 0.05, max = 10))]
-        width: f64,
-    },
-    /// 1 − 3t² + 2t³
-    Cubic,
-    /// 1 − 10t³ + 15t⁴ − 6t⁵
-    Quintic,
-    /// 1 − 35t⁴ + 84t⁵ − 70t⁶ + 20t⁷
-    Septic,
+macro_rules! define {
+    ($(
+        $(#[doc = $about:literal])* $name:ident $key:literal
+        { $($parameter:ident: $default:expr, $least:literal, $most:literal)? },
+    )*) => {
+        /// Influence functions, t = |ξ|/δ.
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(rename_all = "snake_case", deny_unknown_fields)]
+        pub enum InfluenceFunction {
+            $($(#[doc = $about])* #[serde(rename = $key)] $name $({
+                #[schemars(range(min = $least, max = $most))]
+                $parameter: f64,
+            })?,)*
+        }
+
+        impl From<InfluenceFunction> for Influence {
+            fn from(function: InfluenceFunction) -> Self {
+                match function {
+                    $(InfluenceFunction::$name $({ $parameter })? => Influence::$name $({ $parameter })?,)*
+                }
+            }
+        }
+    };
+}
+each_influence!(define);
+
+impl Default for InfluenceFunction {
+    fn default() -> Self {
+        InfluenceFunction::Constant
+    }
 }
 
 /// Rules for cells that the horizon cuts.

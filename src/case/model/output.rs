@@ -1,7 +1,13 @@
 //! Tables of what is written.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::json;
+
+use crate::physics::all_fields;
 
 /// Something to write.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -33,22 +39,40 @@ pub struct Vtu {
     pub fields: Vec<FieldName>,
 }
 
-/// Names of fields.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum FieldName {
-    /// u, m
-    Displacement,
-    /// m/s
-    Velocity,
-    /// Internal force and load, N/m³
-    Force,
-    /// φ, 0 whole to 1 free of all bonds
-    Damage,
-    /// W, J/m³
-    StrainEnergy,
-    /// 1 where bonds are summed, 0 where a point has a row of collocation
-    Scheme,
+/// The name of a field that a physics has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct FieldName(&'static str);
+
+impl FieldName {
+    pub fn name(&self) -> &'static str {
+        self.0
+    }
+}
+
+impl<'de> Deserialize<'de> for FieldName {
+    fn deserialize<T: Deserializer<'de>>(from: T) -> Result<Self, T::Error> {
+        let text = String::deserialize(from)?;
+        let known = all_fields().find(|field| field.name == text);
+        known.map(|field| FieldName(field.name)).ok_or_else(|| T::Error::custom(format!("unknown field `{text}`")))
+    }
+}
+
+/// One variant for each field of the list, as if it were an enum.
+impl JsonSchema for FieldName {
+    fn schema_name() -> Cow<'static, str> {
+        "FieldName".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let variants: Vec<_> = all_fields()
+            .map(|field| {
+                let unit = if field.unit.is_empty() { String::new() } else { format!(", {}", field.unit) };
+                json!({ "type": "string", "const": field.name, "description": format!("{}{unit}", field.about) })
+            })
+            .collect();
+        json_schema!({ "description": "Names of fields.", "oneOf": variants })
+    }
 }
 
 /// PNG pictures.

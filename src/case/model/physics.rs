@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::physics::elasticity::laws;
+
 /// What the body is made of.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -19,47 +21,50 @@ pub struct Elasticity {
     pub failure: Option<Failure>,
 }
 
-/// Laws of elasticity.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Law {
-    /// Bond-based, with large displacements (prototype microelastic brittle).
-    BondBased(BondBased),
-    /// Bond-based, linearised: small displacements and rotations only.
-    BondBasedLinear(BondBased),
-    /// State-based, with large displacements (linear peridynamic solid): any Poisson ratio.
-    StateBased(StateBased),
-    /// State-based, linearised: small displacements and rotations only.
-    StateBasedLinear(StateBased),
-}
-
-impl Law {
-    /// The name of the law in a case.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Law::BondBased(_) => "bond_based",
-            Law::BondBasedLinear(_) => "bond_based_linear",
-            Law::StateBased(_) => "state_based",
-            Law::StateBasedLinear(_) => "state_based_linear",
+macro_rules! define {
+    ($($(#[doc = $about:literal])* $name:ident $key:literal $kind:ident $module:ident::$law:ident,)*) => {
+        /// Laws of elasticity.
+        #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        pub enum Law {
+            $($(#[doc = $about])* #[serde(rename = $key)] $name(define!(@$kind)),)*
         }
-    }
 
-    pub fn is_state_based(&self) -> bool {
-        matches!(self, Law::StateBased(_) | Law::StateBasedLinear(_))
-    }
+        impl Law {
+            /// Which of the list it is.
+            pub fn of(&self) -> laws::Law {
+                match self { $(Law::$name(_) => laws::Law::$name,)* }
+            }
 
-    pub fn is_linear(&self) -> bool {
-        matches!(self, Law::BondBasedLinear(_) | Law::StateBasedLinear(_))
-    }
-
-    /// What all laws are given.
-    pub fn parameters(&self) -> BondBased {
-        match self {
-            Law::BondBased(p) | Law::BondBasedLinear(p) => p.clone(),
-            Law::StateBased(p) | Law::StateBasedLinear(p) => {
-                BondBased { young: p.young, density: p.density, poisson: p.poisson, plane: p.plane }
+            /// What all laws are given.
+            pub fn parameters(&self) -> Parameters {
+                match self { $(Law::$name(p) => p.clone().into(),)* }
             }
         }
+    };
+    (@bonds) => { BondBased };
+    (@solid) => { StateBased };
+}
+laws::each_law!(define);
+
+/// What all laws are given.
+#[derive(Debug, Clone)]
+pub struct Parameters {
+    pub young: f64,
+    pub density: f64,
+    pub poisson: Option<f64>,
+    pub plane: Option<Plane>,
+}
+
+impl From<BondBased> for Parameters {
+    fn from(BondBased { young, density, poisson, plane }: BondBased) -> Self {
+        Parameters { young, density, poisson, plane }
+    }
+}
+
+impl From<StateBased> for Parameters {
+    fn from(StateBased { young, density, poisson, plane }: StateBased) -> Self {
+        Parameters { young, density, poisson, plane }
     }
 }
 

@@ -4,8 +4,6 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::{Limits, SharedSlice, Sum};
 use crate::discretization::Regions;
 use crate::discretization::collocation::SharedRow;
@@ -13,6 +11,7 @@ use crate::execution::Exec;
 use crate::execution::packs::Packs;
 use crate::family::Body;
 use crate::geometry::lattice::BLOCK;
+use crate::parallel;
 
 /// Slots in a slab: the second-level cache holds a few slabs of four vectors in 2D.
 const SLAB: usize = 4096;
@@ -91,8 +90,7 @@ impl<const D: usize, P: Packs> Sum<'_, D, P> {
         let reach = reaches.chain(self.lattice.strides).max().unwrap_or(0);
         let n_slabs = n.div_ceil(SLAB);
         if !blocks.is_sorted() {
-            let slabs = (0..n_slabs).into_par_iter().map(|slab| make(slab * SLAB..((slab + 1) * SLAB).min(n)));
-            let sums: Vec<f64> = slabs.collect();
+            let sums = parallel::map(n_slabs, &|slab| make(slab * SLAB..((slab + 1) * SLAB).min(n)));
             return (self.each(blocks, work), sums.iter().sum());
         }
         let strip = |slabs: Range<usize>| {
@@ -119,7 +117,7 @@ impl<const D: usize, P: Packs> Sum<'_, D, P> {
         };
         let wide = n_slabs.div_ceil(rayon::current_num_threads());
         let starts: Vec<usize> = (0..n_slabs).step_by(wide).collect();
-        let strips: Vec<Strip> = starts.par_iter().map(|&start| strip(start..(start + wide).min(n_slabs))).collect();
+        let strips = parallel::map(starts.len(), &|k| strip(starts[k]..(starts[k] + wide).min(n_slabs)));
         let left: Vec<u32> = strips.iter().flat_map(|s| s.left.clone()).flat_map(|r| &blocks[r]).copied().collect();
         let mut found = self.each(&left, work);
         found.extend(strips.iter().flat_map(|strip| &strip.found));

@@ -58,8 +58,8 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
         Sum { slopes: slope.pairs.iter().map(pair).collect(), classes: &slope.classes, ..self }
     }
 
-    compiled!(divergence, divergence_on, divergence_avx2, divergence_avx512, [], (slot: usize), u16);
-    compiled!(gradient, gradient_on, gradient_avx2, gradient_avx512, [], (slot: usize), ());
+    compiled!(divergence, divergence_on, divergence_avx2, divergence_avx512 if true, [], (slot: usize), u16);
+    compiled!(gradient, gradient_on, gradient_avx2, gradient_avx512 if true, [], (slot: usize), ());
 
     /// The slope's Σ g · (u_j − u) at the points of one block; gives the bits of those that are strained too far.
     #[inline(always)]

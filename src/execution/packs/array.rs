@@ -58,6 +58,13 @@ macro_rules! numbers {
                 }
                 self
             }
+            #[inline(always)]
+            fn select_above(self, limit: Self, mut above: Self, below: Self) -> Self {
+                for k in 0..N {
+                    above.0[k] = if self.0[k] > limit.0[k] { above.0[k] } else { below.0[k] };
+                }
+                above
+            }
         }
 
         impl<const FUSED: bool> Pack<$number> for Array<$number, FUSED> {
@@ -113,6 +120,10 @@ macro_rules! numbers {
             #[inline(always)]
             unsafe fn load(source: *const $number) -> Self {
                 Array(unsafe { source.cast::<[$number; N]>().read_unaligned() })
+            }
+            #[inline(always)]
+            unsafe fn put(self, target: *mut $number) {
+                unsafe { target.cast::<[$number; N]>().write_unaligned(self.0) }
             }
             #[inline(always)]
             fn inverse_root_guess(mut self) -> Self {

@@ -57,6 +57,14 @@ impl Lane for F64 {
         let (a, b, c) = (self.0, factor.0, term.0);
         unsafe { F64([_mm256_fmadd_pd(a[0], b[0], c[0]), _mm256_fmadd_pd(a[1], b[1], c[1])]) }
     }
+    #[inline(always)]
+    fn select_above(self, limit: Self, above: Self, below: Self) -> Self {
+        unsafe {
+            let low = _mm256_cmp_pd::<_CMP_GT_OQ>(self.0[0], limit.0[0]);
+            let high = _mm256_cmp_pd::<_CMP_GT_OQ>(self.0[1], limit.0[1]);
+            F64([_mm256_blendv_pd(below.0[0], above.0[0], low), _mm256_blendv_pd(below.0[1], above.0[1], high)])
+        }
+    }
 }
 
 impl Lane for F32 {
@@ -72,6 +80,10 @@ impl Lane for F32 {
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
         unsafe { F32(_mm256_fmadd_ps(self.0, factor.0, term.0)) }
+    }
+    #[inline(always)]
+    fn select_above(self, limit: Self, above: Self, below: Self) -> Self {
+        unsafe { F32(_mm256_blendv_ps(below.0, above.0, _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, limit.0))) }
     }
 }
 
@@ -138,6 +150,10 @@ impl Pack<f64> for F64 {
         F64(unsafe { load(source) })
     }
     #[inline(always)]
+    unsafe fn put(self, target: *mut f64) {
+        unsafe { Ends::<f64>::store(self, target) }
+    }
+    #[inline(always)]
     fn inverse_root_guess(self) -> Self {
         unsafe {
             let magic = _mm256_set1_epi64x(GUESS_DOUBLE.cast_signed());
@@ -193,6 +209,10 @@ impl Pack<f32> for F32 {
     #[inline(always)]
     unsafe fn load(source: *const f32) -> Self {
         F32(unsafe { _mm256_loadu_ps(source) })
+    }
+    #[inline(always)]
+    unsafe fn put(self, target: *mut f32) {
+        unsafe { Ends::<f32>::store(self, target) }
     }
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {

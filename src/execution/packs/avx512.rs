@@ -57,6 +57,15 @@ impl Lane for F64 {
         let (a, b, c) = (self.0, factor.0, term.0);
         unsafe { F64([_mm512_fmadd_pd(a[0], b[0], c[0]), _mm512_fmadd_pd(a[1], b[1], c[1])]) }
     }
+    #[inline(always)]
+    fn select_above(self, limit: Self, above: Self, below: Self) -> Self {
+        unsafe {
+            let low = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0[0], limit.0[0]);
+            let high = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0[1], limit.0[1]);
+            let select = |mask, above, below| _mm512_mask_blend_pd(mask, below, above);
+            F64([select(low, above.0[0], below.0[0]), select(high, above.0[1], below.0[1])])
+        }
+    }
 }
 
 impl Lane for F32 {
@@ -72,6 +81,13 @@ impl Lane for F32 {
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
         unsafe { F32(_mm512_fmadd_ps(self.0, factor.0, term.0)) }
+    }
+    #[inline(always)]
+    fn select_above(self, limit: Self, above: Self, below: Self) -> Self {
+        unsafe {
+            let mask = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, limit.0);
+            F32(_mm512_mask_blend_ps(mask, below.0, above.0))
+        }
     }
 }
 
@@ -129,6 +145,10 @@ impl Pack<f64> for F64 {
         F64(unsafe { load(source) })
     }
     #[inline(always)]
+    unsafe fn put(self, target: *mut f64) {
+        unsafe { Ends::<f64>::store(self, target) }
+    }
+    #[inline(always)]
     fn inverse_root_guess(self) -> Self {
         unsafe {
             let magic = _mm512_set1_epi64(GUESS_DOUBLE.cast_signed());
@@ -183,6 +203,10 @@ impl Pack<f32> for F32 {
     #[inline(always)]
     unsafe fn load(source: *const f32) -> Self {
         F32(unsafe { _mm512_loadu_ps(source) })
+    }
+    #[inline(always)]
+    unsafe fn put(self, target: *mut f32) {
+        unsafe { Ends::<f32>::store(self, target) }
     }
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {

@@ -94,6 +94,9 @@ pub trait Pack<B: Number>: Lane {
     /// # Safety
     /// As many as there are lanes must stand there.
     unsafe fn load(source: *const B) -> Self;
+    /// # Safety
+    /// There must be room for as many numbers as there are lanes.
+    unsafe fn put(self, target: *mut B);
     /// 1/√self within 4 % for positive numbers, from their bits.
     fn inverse_root_guess(self) -> Self;
 

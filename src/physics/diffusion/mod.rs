@@ -1,7 +1,9 @@
 //! Diffusion along bonds: Ċ = ∫ J dV′ + S with the flux J = κ ω(|ξ|/δ) (C′ − C)/|ξ|^q of a bond.
 //!
 //! Shojaei et al. 2022, eqs. (22)-(25); by the standard sum, (27), or by collocation, (56)-(60). The sum gives L C;
-//! sources S are added by who has them.
+//! sources S are added by who has them. [`Diffusing`] is a body with it, as a physics.
+
+mod physics;
 
 use std::collections::BTreeMap;
 
@@ -62,6 +64,8 @@ impl Flux {
         Law::Diffusive { influence, micro_diffusivity, q: f64::from(q) }
     }
 }
+
+pub use physics::{Diffusing, FIELDS};
 
 /// L C on one body.
 #[derive(Debug, Clone)]
@@ -246,6 +250,7 @@ pub fn mass<const D: usize>(cloud: &Cloud<D>, exec: &mut Exec, concentration: &[
 struct Conduction(u32);
 
 impl<const D: usize> BondKernel<D, 1, 1> for Conduction {
+    const EVERY_STEP: bool = true;
     const LINEAR: bool = true;
 
     #[inline(always)]

@@ -9,8 +9,6 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use rayon::prelude::*;
-
 use super::{Elasticity, Physics, Replaced};
 use crate::discretization::Scaling;
 use crate::execution::Packs;
@@ -19,6 +17,7 @@ use crate::expression::Expression;
 use crate::family::{Body, Bond, BondStates, CloudFamilies, Families, GROUP, Grading, Rule};
 use crate::field::{Number, Vector, components, difference, dot, embed, norm};
 use crate::geometry::Crack;
+use crate::parallel;
 use crate::physics::Remap;
 use crate::refinement::{Cells, Origin, Transition, Zones, horizons};
 
@@ -80,7 +79,7 @@ impl<const D: usize> Adaptation<D> {
                 asked[j] > list[k].level && far <= self.ratio * self.cells.size(list[k].level)
             })
         };
-        (0..list.len()).into_par_iter().filter(|&k| sees(k)).count()
+        parallel::map(list.len(), &sees).into_iter().filter(|sees| *sees).count()
     }
 }
 
@@ -364,14 +363,14 @@ impl<const D: usize> Cuts<'_, D> {
             };
             self.families.of(point).any(broken)
         };
-        let damaged: Vec<bool> = (0..n).into_par_iter().map(is_damaged).collect();
+        let damaged = parallel::map(n, &is_damaged);
         if !damaged.contains(&true) {
             return [Vec::new(), Vec::new()];
         }
         let is_near = |point: usize| {
             damaged[point] || self.families.neighbours[self.families.of(point)].iter().any(|&j| damaged[j as usize])
         };
-        let near = (0..n).into_par_iter().map(is_near).collect();
+        let near = parallel::map(n, &is_near);
         [damaged, near]
     }
 
@@ -464,7 +463,7 @@ mod tests {
         let failure = Some(CriticalStretch::uniform(1e-3).scaled(&grading.horizons, scaling.horizon));
         let body = scaling.body(cloud, grading);
         let operator = scaling.operator(&body, &Update::default(), None, None);
-        let mut problem = Elasticity::new(body, operator, Box::new(Bonds(BondBasedLinear)), 1.0, failure);
+        let mut problem = Elasticity::new(body, operator, Box::new(Bonds::new(BondBasedLinear)), 1.0, failure);
         for crack in &cracks {
             problem.cut(crack, 1e-9 * H);
         }

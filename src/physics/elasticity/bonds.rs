@@ -5,20 +5,47 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::State;
-use super::kernels::{Diagonal, DiagonalRow, Energy, Force, Tangent};
+use super::kernels::{Diagonal, DiagonalRow, Energy, Force, Spring};
 use super::material::{Edge, Material, On};
 use super::surface::{Shares, shares_of_bonds};
 use crate::discretization::{BondWeights, Scaling};
-use crate::execution::{BlockRow, BreakRule, Broken, Exec, Packs};
-use crate::family::{Body, Bond, BondLaw, BondStates, Families};
+use crate::execution::{BlockRow, BreakRule, Broken, Exec, Packs, Unbreakable};
+use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
 use crate::field::{Double, Number, components, components_mut, dot};
+use crate::geometry::lattice::BLOCK;
 use crate::physics::failure::CriticalStretch;
+use crate::visit::Visitor;
 
 /// A material of bonds alone.
 #[derive(Debug, Clone)]
-pub struct Bonds<L>(pub L);
+pub struct Bonds<L, P: Packs> {
+    law: L,
+    /// What the law keeps of each bond, in the order of the states; empty where it keeps nothing.
+    memory: Vec<P::Bond>,
+}
 
-impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L> {
+impl<L, P: Packs> Bonds<L, P> {
+    pub fn new(law: L) -> Self {
+        Bonds { law, memory: Vec::new() }
+    }
+
+    /// Sums a kernel of a law with memory, after `rule` has broken bonds; the memory changes if `keeps`.
+    fn remember<const D: usize, const O: usize, R: BreakRule<D>>(
+        &mut self,
+        on: &mut On<'_, D>,
+        states: &mut BondStates,
+        u: [&[P::Field]; D],
+        output: [&mut [P::Field]; O],
+        kernel: &impl BondKernel<D, D, O>,
+        (rule, keeps): (&R, bool),
+    ) -> Broken {
+        self.memory.resize(BLOCK * on.body.n_words(), P::Bond::default());
+        let (weights, memory) = (&on.operator.weights, (&mut self.memory[..], keeps));
+        on.exec.sum_bonds_remembering::<D, D, O, P>(on.body, weights, states, u, memory, output, kernel, rule)
+    }
+}
+
+impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
     fn is_linear(&self) -> bool {
         L::LINEAR
     }
@@ -31,12 +58,12 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L> {
         let weights = &on.operator.weights;
         let stiffest = match &on.body.families {
             Families::Lattice(families) => {
-                families.offsets.iter().zip(&weights.by_offset).map(|(o, w)| self.0.tangent(o.length, *w)).sum::<f64>()
+                families.offsets.iter().zip(&weights.by_offset).map(|(o, w)| w / o.length).sum::<f64>()
             }
             Families::Cloud(_) => {
                 let mut spring = vec![0.0; on.body.cloud.n_slots()];
-                let (whole, kernel) = (BondStates::whole(on.body), Tangent(self.0));
-                on.exec.sum_bonds::<D, 0, 1, Double>(on.body, weights, &whole, [], [&mut spring], &kernel);
+                let whole = BondStates::whole(on.body);
+                on.exec.sum_bonds::<D, 0, 1, Double>(on.body, weights, &whole, [], [&mut spring], &Spring);
                 spring.into_iter().fold(0.0, f64::max)
             }
         };
@@ -44,37 +71,50 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L> {
     }
 
     fn first_pass(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>, edge: Option<&Edge<'_>>) {
-        let (input, output) = (components::<D, _>(&state.displacement), components_mut::<D, _>(&mut state.force));
-        let (weights, kernel) = (&on.operator.weights, Force(self.0));
-        let (Some(failure), Some(dt)) = (on.failure, step) else {
-            return on.exec.sum_bonds::<D, D, D, P>(on.body, weights, &state.states, input, output, &kernel);
+        let State { displacement, velocity, force, states, broken } = state;
+        let (u, force, kernel) = (components::<D, _>(displacement), components_mut::<D, _>(force), Force(self.law));
+        let weights = &on.operator.weights;
+        let rule = on.failure.zip(step).map(|(failure, dt)| {
+            let velocity = components::<D, _>(velocity);
+            Breaking::<D, L, P::Field> { failure, law: self.law, displacement: u, velocity, dt, edge }
+        });
+        let now = match rule {
+            Some(rule) if L::MEMORY => self.remember(on, states, u, force, &kernel, (&rule, true)),
+            None if L::MEMORY => self.remember(on, states, u, force, &kernel, (&Unbreakable, step.is_some())),
+            Some(rule) => on.exec.sum_bonds_and_break::<D, D, D, P>(on.body, weights, states, u, force, &kernel, &rule),
+            None => {
+                on.exec.sum_bonds::<D, D, D, P>(on.body, weights, states, u, force, &kernel);
+                Broken::default()
+            }
         };
-        let velocity = components::<D, _>(&state.velocity);
-        let rule = Breaking::<D, L, P::Field> { failure, law: self.0, displacement: input, velocity, dt, edge };
-        let states = &mut state.states;
-        let now = on.exec.sum_bonds_and_break::<D, D, D, P>(on.body, weights, states, input, output, &kernel, &rule);
-        state.broken.bonds += now.bonds;
-        state.broken.energy += now.energy;
+        broken.bonds += now.bonds;
+        broken.energy += now.energy;
     }
 
     fn force_in_double(&self, on: &mut On<'_, D>, states: &BondStates, u: [&[f64]; D], force: [&mut [f64]; D]) {
-        on.exec.sum_bonds::<D, D, D, Double>(on.body, &on.operator.weights, states, u, force, &Force(self.0));
+        if L::MEMORY {
+            // A copy: nothing is kept.
+            let memory = self.memory.iter().map(|m| m.to_f64()).collect();
+            let mut bonds = Bonds::<L, Double> { law: self.law, memory };
+            bonds.remember(on, &mut states.clone(), u, force, &Force(self.law), (&Unbreakable, false));
+            return;
+        }
+        on.exec.sum_bonds::<D, D, D, Double>(on.body, &on.operator.weights, states, u, force, &Force(self.law));
     }
 
     /// W = ½ Σ w β V′; eq. (9).
     fn energy_density(&self, on: &mut On<'_, D>, states: &BondStates, u: [&[P::Field]; D], density: &mut [P::Field]) {
-        on.exec.sum_bonds::<D, D, 1, P>(on.body, &on.operator.weights, states, u, [density], &Energy(self.0));
+        on.exec.sum_bonds::<D, D, 1, P>(on.body, &on.operator.weights, states, u, [density], &Energy(self.law));
     }
 
     /// Σ k e_d² β V′ with e = ξ/|ξ|.
     fn diagonal(&self, on: &mut On<'_, D>, states: &BondStates, diagonal: [&mut [f64]; D]) {
-        let (weights, kernel) = (&on.operator.weights, Diagonal(self.0));
-        on.exec.sum_bonds::<D, 0, D, Double>(on.body, weights, states, [], diagonal, &kernel);
+        on.exec.sum_bonds::<D, 0, D, Double>(on.body, &on.operator.weights, states, [], diagonal, &Diagonal);
     }
 
     /// Σ e_row e_d k β V′ over whole bonds.
     fn diagonal_row(&self, row: usize, on: &mut On<'_, D>, states: &BondStates, sums: [&mut [f64]; D]) -> bool {
-        let (weights, kernel) = (&on.operator.weights, DiagonalRow(self.0, row));
+        let (weights, kernel) = (&on.operator.weights, DiagonalRow(row));
         on.exec.sum_bonds::<D, 0, D, Double>(on.body, weights, states, [], sums, &kernel);
         true
     }
@@ -86,7 +126,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L> {
         states: &BondStates,
         u: [&[f64]; D],
     ) -> Option<Vec<BlockRow<D>>> {
-        let law = self.0;
+        let law = self.law;
         Some(Exec::blocks(body, weights, states, u, |bond, eta| law.stiffness(bond, eta)))
     }
 
@@ -100,17 +140,25 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L> {
         largest: &AtomicU64,
     ) -> Broken {
         let Some(failure) = on.failure else { return Broken::default() };
-        let rule = Overstrained { failure, law: self.0, displacement: u, limit, largest };
-        let (weights, kernel) = (&on.operator.weights, Force(self.0));
+        let rule = Overstrained { failure, law: self.law, displacement: u, limit, largest };
+        let (weights, kernel) = (&on.operator.weights, Force(self.law));
         on.exec.sum_bonds_and_break::<D, D, D, Double>(on.body, weights, states, u, force, &kernel, &rule)
     }
 
     fn strain_ratio(&self, bond: &Bond<D, f64>, eta: &[f64; D], critical: f64) -> f64 {
-        self.0.strain(bond, eta) / self.0.strain_at(critical)
+        self.law.strain(bond, eta) / self.law.strain_at(critical)
+    }
+
+    fn memory(&self) -> usize {
+        size_of_val(&self.memory[..])
+    }
+
+    fn visit(&mut self, visitor: &mut dyn Visitor) {
+        P::Bond::visit(&mut self.memory, "memory_of_bonds", visitor);
     }
 
     fn shares(&self, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
-        shares_of_bonds(self.0, on, scaling)
+        shares_of_bonds(on, scaling)
     }
 }
 

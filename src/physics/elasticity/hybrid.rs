@@ -12,8 +12,6 @@
 use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
-use rayon::prelude::*;
-
 use super::State;
 use super::material::{Edge, Material, On, Overstretched};
 use super::surface::Shares;
@@ -22,6 +20,7 @@ use crate::discretization::{BondWeights, Regions, Scaling};
 use crate::execution::{BlockRow, Broken, Exec, Limits, Motion, Packs};
 use crate::family::{Body, Bond, BondStates, Families};
 use crate::field::{Number, components, components_mut};
+use crate::parallel;
 use crate::solver::Drift;
 use crate::visit::Visitor;
 
@@ -199,9 +198,8 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
         }
         self.damped_displacement.resize(displacement.len(), P::Field::default());
         let tau = P::Field::from_f64(self.damping);
-        let damped = self.damped_displacement.par_chunks_mut(CHUNK);
-        damped.zip(displacement.par_chunks(CHUNK)).zip(velocity.par_chunks(CHUNK)).for_each(|((damped, u), v)| {
-            for ((damped, u), v) in damped.iter_mut().zip(u).zip(v) {
+        parallel::fill(&mut self.damped_displacement, CHUNK, &|first, damped| {
+            for ((damped, u), v) in damped.iter_mut().zip(&displacement[first..]).zip(&velocity[first..]) {
                 *damped = *u + tau * *v;
             }
         });
@@ -423,8 +421,8 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
             return None;
         }
         let tau = P::Field::from_f64(self.damping);
-        self.damped_displacement.par_chunks_mut(CHUNK).zip(state.velocity.par_chunks(CHUNK)).for_each(|(damped, v)| {
-            damped.iter_mut().zip(v).for_each(|(damped, v)| *damped = tau * *v);
+        parallel::fill(&mut self.damped_displacement, CHUNK, &|first, damped| {
+            damped.iter_mut().zip(&state.velocity[first..]).for_each(|(damped, v)| *damped = tau * *v);
         });
         let mut density = vec![P::Field::default(); on.body.cloud.n_slots()];
         let input = components::<D, _>(&self.damped_displacement);

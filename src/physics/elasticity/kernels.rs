@@ -22,7 +22,14 @@ pub(super) struct Force<L>(pub L);
 
 impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, D> for Force<B> {
     const SMALL: f64 = B::SMALL;
+    const EVERY_STEP: bool = true;
     const LINEAR: bool = B::LINEAR;
+    const MEMORY: bool = B::MEMORY;
+
+    #[inline(always)]
+    fn remember<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
+        self.0.remember(bond, strain)
+    }
 
     #[inline(always)]
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
@@ -43,6 +50,12 @@ pub(super) struct Energy<L>(pub L);
 
 impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, 1> for Energy<B> {
     const SMALL: f64 = B::SMALL;
+    const MEMORY: bool = B::MEMORY;
+
+    #[inline(always)]
+    fn remember<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
+        self.0.remember(bond, strain)
+    }
 
     #[inline(always)]
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
@@ -58,27 +71,33 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, 1> for Energy<B> {
     }
 }
 
-/// Σ k
-pub(super) struct Tangent<L>(pub L);
+/// The spring constant of a bond at rest, weighted.
+#[inline(always)]
+pub(super) fn spring<const D: usize, L: Lane>(bond: &Bond<D, L>) -> L {
+    bond.weight / bond.length
+}
 
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 1> for Tangent<B> {
+/// Σ k
+pub(super) struct Spring;
+
+impl<const D: usize> BondKernel<D, 0, 1> for Spring {
     const RELATIVE: bool = false;
 
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: &[L; 0], _: L, [sum]: [L; 1]) -> [L; 1] {
-        [sum + self.0.tangent(bond.length, bond.weight)]
+        [sum + spring(bond)]
     }
 }
 
 /// Σ k e_d²
-pub(super) struct Diagonal<L>(pub L);
+pub(super) struct Diagonal;
 
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for Diagonal<B> {
+impl<const D: usize> BondKernel<D, 0, D> for Diagonal {
     const RELATIVE: bool = false;
 
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: &[L; 0], _: L, mut sum: [L; D]) -> [L; D] {
-        let spring = self.0.tangent(bond.length, bond.weight) * bond.inverse_square;
+        let spring = spring(bond) * bond.inverse_square;
         for d in 0..D {
             sum[d] = (bond.xi[d] * bond.xi[d]).mul_add(spring, sum[d]);
         }
@@ -87,14 +106,14 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for Diagonal<B> {
 }
 
 /// One row of Σ k e eᵀ at rest.
-pub(super) struct DiagonalRow<L>(pub L, pub usize);
+pub(super) struct DiagonalRow(pub usize);
 
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, D> for DiagonalRow<B> {
+impl<const D: usize> BondKernel<D, 0, D> for DiagonalRow {
     const RELATIVE: bool = false;
 
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: &[L; 0], _: L, mut sum: [L; D]) -> [L; D] {
-        let spring = self.0.tangent(bond.length, bond.weight) * bond.inverse_square * bond.xi[self.1];
+        let spring = spring(bond) * bond.inverse_square * bond.xi[self.0];
         for d in 0..D {
             sum[d] = bond.xi[d].mul_add(spring, sum[d]);
         }

@@ -31,13 +31,12 @@ mod moduli;
 
 use std::sync::Mutex;
 
-use rayon::prelude::*;
-
 pub use moduli::Moduli;
 
 use super::State;
 use super::kernels::Energy;
-use super::laws::bond_based::{BondBased, BondBasedLinear, FORCE, STRETCH};
+use super::laws::bond_based::{FORCE, STRETCH};
+use super::laws::{BondBased, BondBasedLinear};
 use super::material::{Edge, Material, On};
 use super::surface::{Shares, shares_of_solid};
 use crate::discretization::{BondWeights, Scaling};
@@ -47,6 +46,7 @@ use crate::field::{Double, Number, components, components_mut, dot};
 use crate::geometry::Arrangement;
 use crate::geometry::lattice::BLOCK;
 use crate::lane::{Lane, polynomial};
+use crate::parallel;
 use crate::physics::failure::CriticalStretch;
 use crate::visit::Visitor;
 
@@ -99,10 +99,10 @@ impl<L, F: Number> LinearSolid<L, F> {
 
     /// S → p = h S
     fn scale<T: Number>(&self, sums: &mut [T]) {
-        let scale = |(sums, bulk): (&mut [T], &[f64])| {
-            sums.iter_mut().zip(bulk).for_each(|(s, h)| *s = T::from_f64(s.to_f64() * h));
-        };
-        sums.par_chunks_mut(4096).zip(self.bulk.par_chunks(4096)).for_each(scale);
+        let bulk = &self.bulk;
+        parallel::fill(sums, 4096, &|first, sums| {
+            sums.iter_mut().zip(&bulk[first..]).for_each(|(s, h)| *s = T::from_f64(s.to_f64() * h));
+        });
     }
 
     /// f from u, p and q.
@@ -264,7 +264,7 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
     }
 
     fn shares(&self, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
-        shares_of_solid(self.law, &self.moduli, on, scaling)
+        shares_of_solid(&self.moduli, on, scaling)
     }
 
     fn memory(&self) -> usize {
@@ -386,6 +386,7 @@ struct Extension<B>(B);
 
 impl<const D: usize, B: Stretch<D>> BondKernel<D, D, 1> for Extension<B> {
     const SMALL: f64 = B::SMALL;
+    const EVERY_STEP: bool = true;
 
     #[inline(always)]
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
@@ -406,6 +407,7 @@ struct Pull<B>(B);
 
 impl<const D: usize, B: Stretch<D>> BondKernel<D, D, D, 2> for Pull<B> {
     const SMALL: f64 = B::SMALL;
+    const EVERY_STEP: bool = true;
 
     #[inline(always)]
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {

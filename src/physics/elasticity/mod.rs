@@ -16,8 +16,6 @@ mod tangent;
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 pub use adapt::{Adaptation, INDICATORS};
 pub use bonds::Bonds;
 pub use hybrid::{Hybrid, Work};
@@ -31,6 +29,7 @@ use crate::execution::{Broken, Exec, Packs};
 use crate::family::{Body, BondStates, Families};
 use crate::field::{Double, Field, Number, Precision, Values, components, embed};
 use crate::geometry::{Arrangement, Crack};
+use crate::parallel;
 use crate::physics::failure::CriticalStretch;
 use crate::solver::Drift;
 use crate::unknown::{Unknown, Vectors};
@@ -163,11 +162,11 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         // Points with a row have lost no bond.
         let mut now: Vec<f64> = self.family_volume.iter().map(|whole| whole.to_f64()).collect();
         bonded_volume(&mut self.exec, &self.body, &self.operator.volumes, &self.state.states, &mut now);
-        let damage = |(now, whole): (&f64, &P::Field)| {
-            let [now, whole] = [P::Field::from_f64(*now), *whole].map(P::Field::to_f64);
+        let damage = |slot: usize| {
+            let [now, whole] = [P::Field::from_f64(now[slot]), self.family_volume[slot]].map(P::Field::to_f64);
             if whole > 0.0 { 1.0 - now / whole } else { 0.0 }
         };
-        now.par_iter().zip(&self.family_volume).map(damage).collect()
+        parallel::map(now.len(), &damage)
     }
 
     /// One of the vectors at some slots.
@@ -265,11 +264,19 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
     }
 
     fn points(&self) -> &dyn Points {
-        self
+        &self.body
     }
 
-    fn bonds(&self) -> &dyn super::Bonds {
-        self
+    fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    fn states(&self) -> &BondStates {
+        &self.state.states
+    }
+
+    fn n_bonds(&self) -> [u64; 2] {
+        [self.n_bonds, self.n_cut]
     }
 
     fn motion(&mut self) -> (f64, [f64; 3]) {
@@ -469,60 +476,9 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
     }
 }
 
-impl<const D: usize, P: Packs> Points for Elasticity<D, P> {
-    fn dimension(&self) -> usize {
-        D
-    }
-    fn n_points(&self) -> usize {
-        self.body.cloud.n_points()
-    }
-    fn slots(&self) -> &[u32] {
-        &self.body.cloud.slots
-    }
-    fn n_slots(&self) -> usize {
-        self.body.cloud.n_slots()
-    }
-    fn position(&self, slot: usize) -> [f64; 3] {
-        embed(&self.body.cloud.position(slot))
-    }
-    fn volume(&self, slot: usize) -> f64 {
-        self.body.cloud.volume(slot)
-    }
-    fn same_volume(&self) -> Option<f64> {
-        match &self.body.cloud.arrangement {
-            Arrangement::Lattice(lattice) => Some(lattice.cell_volume()),
-            Arrangement::Scattered { .. } => None,
-        }
-    }
-    fn spacing(&self) -> f64 {
-        self.body.cloud.spacing
-    }
-    fn horizon(&self) -> f64 {
-        self.body.horizon
-    }
-    fn generation(&self) -> u64 {
-        self.generation
-    }
-}
-
-impl<const D: usize, P: Packs> super::Bonds for Elasticity<D, P> {
-    fn count(&self) -> [u64; 2] {
-        [self.n_bonds, self.n_cut]
-    }
-    fn per_point(&self) -> Vec<u32> {
-        self.state.states.per_point(&self.body)
-    }
-    fn words(&self) -> &[u16] {
-        self.state.states.words()
-    }
-    fn ends(&self, bit: usize) -> [[f64; 3]; 2] {
-        self.state.states.ends(&self.body, bit).map(|slot| embed(&self.body.cloud.position(slot)))
-    }
-}
-
-/// A value for each slot. Compiled for each type of value only.
+/// A value for each slot.
 fn gather<T: Send>(slots: &[u32], value: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
-    slots.par_iter().map(|&slot| value(slot as usize)).collect()
+    parallel::map(slots.len(), &|k| value(slots[k] as usize))
 }
 
 /// Σ v² V and Σ v V; V = 1 where none is given. Eight sums side by side, so that the loop is vectors.

@@ -8,12 +8,12 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::kernels::bonded_volume;
+use super::kernels::{bonded_volume, spring};
 use super::linear_solid::Moduli;
 use super::material::{Material, On};
 use crate::discretization::{Correction, Scaling};
 use crate::execution::Packs;
-use crate::family::{Bond, BondKernel, BondLaw, BondStates};
+use crate::family::{Bond, BondKernel, BondStates};
 use crate::field::Double;
 use crate::lane::Lane;
 
@@ -78,19 +78,19 @@ pub fn correction_by_volume<const D: usize>(on: &mut On<'_, D>, scaling: &Scalin
 }
 
 /// The sums of the energies of bonds, not yet over those of a complete family.
-fn energies<const D: usize, L: BondLaw<D>>(law: L, on: &mut On<'_, D>) -> Shares {
+fn energies<const D: usize>(on: &mut On<'_, D>) -> Shares {
     let body = on.body;
     let mut sums: Shares = std::array::from_fn(|_| vec![0.0; body.cloud.n_slots()]);
-    let (weights, whole, kernel) = (&on.operator.weights, BondStates::whole(body), UnitStrain(law));
+    let (weights, whole, kernel) = (&on.operator.weights, BondStates::whole(body), UnitStrain);
     let output = sums.each_mut().map(|sum| &mut sum[..]);
     on.exec.sum_bonds::<D, 0, 4, Double>(body, weights, &whole, [], output, &kernel);
     sums
 }
 
 /// [`Shares`] of a material of bonds.
-pub(super) fn shares_of_bonds<const D: usize, L: BondLaw<D>>(law: L, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
-    let mut shares = energies(law, on);
-    let (body, kernel) = (on.body, UnitStrain(law));
+pub(super) fn shares_of_bonds<const D: usize>(on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
+    let mut shares = energies(on);
+    let (body, kernel) = (on.body, UnitStrain);
     let complete = |size, horizon| {
         let mut sum = [0.0; 4];
         scaling.complete::<D>(size, horizon, |bond, _| sum = kernel.add(bond, &[], &[], 0.0, sum));
@@ -120,21 +120,16 @@ pub(super) fn shares_of_bonds<const D: usize, L: BondLaw<D>>(law: L, on: &mut On
 
 /// [`Shares`] of a body whose points have a weighted volume of their own, from the sums of the energies of bonds. Unit
 /// strain in all directions has the energy of a complete family everywhere.
-pub(super) fn shares_of_solid<const D: usize, L: BondLaw<D>>(
-    law: L,
-    moduli: &Moduli,
-    on: &mut On<'_, D>,
-    scaling: &Scaling,
-) -> Shares {
-    let mut shares = energies(law, on);
+pub(super) fn shares_of_solid<const D: usize>(moduli: &Moduli, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
+    let mut shares = energies(on);
     let body = on.body;
     let mut squares: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; body.cloud.n_slots()]);
-    let (weights, whole, kernel) = (&on.operator.weights, BondStates::whole(body), Squares(law));
+    let (weights, whole, kernel) = (&on.operator.weights, BondStates::whole(body), Squares);
     let output = squares.each_mut().map(|sum| &mut sum[..]);
     on.exec.sum_bonds::<D, 0, 3, Double>(body, weights, &whole, [], output, &kernel);
     let (mut energies, mut sums) = ([0.0; 4], [0.0; 3]);
     scaling.complete::<D>(body.cloud.spacing, body.horizon, |bond, _| {
-        energies = UnitStrain(law).add(bond, &[], &[], 0.0, energies);
+        energies = UnitStrain.add(bond, &[], &[], 0.0, energies);
         sums = kernel.add(bond, &[], &[], 0.0, sums);
     });
     let [axes @ .., moments] = &mut shares;
@@ -149,14 +144,14 @@ pub(super) fn shares_of_solid<const D: usize, L: BondLaw<D>>(
 }
 
 /// Σ k ξ_d²
-struct Squares<L>(L);
+struct Squares;
 
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 3> for Squares<B> {
+impl<const D: usize> BondKernel<D, 0, 3> for Squares {
     const RELATIVE: bool = false;
 
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: &[L; 0], _: L, mut sum: [L; 3]) -> [L; 3] {
-        let spring = self.0.tangent(bond.length, bond.weight);
+        let spring = spring(bond);
         for d in 0..D {
             sum[d] = (bond.xi[d] * bond.xi[d]).mul_add(spring, sum[d]);
         }
@@ -165,14 +160,14 @@ impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 3> for Squares<B> {
 }
 
 /// Σ k ξ_d⁴/|ξ|² and Σ k |ξ|²
-struct UnitStrain<L>(L);
+struct UnitStrain;
 
-impl<const D: usize, B: BondLaw<D>> BondKernel<D, 0, 4> for UnitStrain<B> {
+impl<const D: usize> BondKernel<D, 0, 4> for UnitStrain {
     const RELATIVE: bool = false;
 
     #[inline(always)]
     fn add<L: Lane>(&self, bond: &Bond<D, L>, _: &[L; 0], _: &[L; 0], _: L, mut sum: [L; 4]) -> [L; 4] {
-        let spring = self.0.tangent(bond.length, bond.weight);
+        let spring = spring(bond);
         for d in 0..D {
             let square = bond.xi[d] * bond.xi[d];
             sum[d] = (square * square * bond.inverse_square).mul_add(spring, sum[d]);

@@ -39,7 +39,7 @@ impl<const D: usize, P: Packs> Tangent for Elasticity<D, P> {
     }
 
     fn points(&self) -> &dyn Points {
-        self
+        &self.body
     }
 
     fn displacement(&mut self) -> Vec<f64> {

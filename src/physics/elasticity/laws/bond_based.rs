@@ -1,9 +1,10 @@
 //! Bond-based elasticity: each bond is a spring of its own.
 //!
 //! The prototype microelastic brittle material of Silling & Askari (2005) with an influence function (Shojaei et al.
-//! 2022, eqs. (7)–(16)), with large displacements and linearised. The Poisson ratio is fixed by the theory: 1/3 in
-//! plane stress, 1/4 in plane strain and in 3D.
+//! 2022, eqs. (7)–(15)), with large displacements. The Poisson ratio is fixed by the theory: 1/3 in plane stress, 1/4 in
+//! plane strain and in 3D.
 
+use super::spring_energy;
 use crate::family::{Bond, BondLaw};
 use crate::field::dot;
 use crate::lane::{Lane, polynomial};
@@ -15,10 +16,6 @@ use crate::lane::{Lane, polynomial};
 /// |q| ≤ 0.01, that is stretches of half a percent.
 #[derive(Debug, Clone, Copy)]
 pub struct BondBased;
-
-/// Small displacements: f = ω c (ξ ⊗ ξ)/|ξ|³ η, s = ξ·η/|ξ|²; eq. (16). The strain is s.
-#[derive(Debug, Clone, Copy)]
-pub struct BondBasedLinear;
 
 impl<const D: usize> BondLaw<D> for BondBased {
     const SMALL: f64 = 0.01;
@@ -58,11 +55,6 @@ impl<const D: usize> BondLaw<D> for BondBased {
     fn small_energy<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
         let series = if L::SINGLE { polynomial(STRETCH_SINGLE, strain) } else { polynomial(STRETCH, strain) };
         spring_energy(bond, strain * series)
-    }
-
-    #[inline(always)]
-    fn tangent<L: Lane>(&self, length: L, weight: L) -> L {
-        weight / length
     }
 
     /// Of f = weight (1 − |ξ|/|y|) y/|ξ|, y = ξ + η: weight/|ξ| [e eᵀ + (1 − |ξ|/|y|) (1 − e eᵀ)], e = y/|y|.
@@ -105,48 +97,6 @@ pub(crate) const STRETCH: [f64; 7] = [
 /// The same for single precision: relative error 5e-10.
 const STRETCH_SINGLE: [f64; 4] = [1.0 / 2.0, -1.0 / 8.0, 1.0 / 16.0, -5.0 / 128.0];
 
-impl<const D: usize> BondLaw<D> for BondBasedLinear {
-    const LINEAR: bool = true;
-
-    #[inline(always)]
-    fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
-        let mut along = eta[0] * bond.xi[0];
-        for d in 1..D {
-            along = eta[d].mul_add(bond.xi[d], along);
-        }
-        along * bond.inverse_square
-    }
-
-    fn strain_at(&self, stretch: f64) -> f64 {
-        stretch
-    }
-
-    #[inline(always)]
-    fn force<L: Lane>(&self, bond: &Bond<D, L>, _eta: &[L; D], strain: L, mut sum: [L; D]) -> [L; D] {
-        let factor = bond.spring * strain;
-        for d in 0..D {
-            sum[d] = factor.mul_add(bond.xi[d], sum[d]);
-        }
-        sum
-    }
-
-    #[inline(always)]
-    fn energy<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
-        spring_energy(bond, strain)
-    }
-
-    #[inline(always)]
-    fn tangent<L: Lane>(&self, length: L, weight: L) -> L {
-        weight / length
-    }
-
-    /// weight/|ξ| e eᵀ, e = ξ/|ξ|.
-    fn stiffness(&self, bond: &Bond<D, f64>, _eta: &[f64; D]) -> [[f64; D]; D] {
-        let spring = bond.spring * bond.inverse_square;
-        std::array::from_fn(|c| std::array::from_fn(|d| spring * bond.xi[c] * bond.xi[d]))
-    }
-}
-
 /// sum + factor (ξ + η)
 #[inline(always)]
 fn along_deformed<const D: usize, L: Lane>(bond: &Bond<D, L>, eta: &[L; D], factor: L, mut sum: [L; D]) -> [L; D] {
@@ -156,53 +106,10 @@ fn along_deformed<const D: usize, L: Lane>(bond: &Bond<D, L>, eta: &[L; D], fact
     sum
 }
 
-/// ½ ω c s² |ξ|, without s², which single precision may not hold.
-#[inline(always)]
-fn spring_energy<const D: usize, L: Lane>(bond: &Bond<D, L>, stretch: L) -> L {
-    L::splat(0.5) * bond.weight * bond.length * stretch * stretch
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::tests::response;
     use super::*;
-
-    /// Force and energy of one bond, in both forms: `small` picks the second.
-    fn response<const D: usize>(
-        law: impl BondLaw<D>,
-        bond: &Bond<D, f64>,
-        eta: [f64; D],
-        small: bool,
-    ) -> ([f64; D], f64) {
-        let strain = law.strain(bond, &eta);
-        if small {
-            (law.small_force(bond, &eta, strain, [0.0; D]), law.small_energy(bond, strain))
-        } else {
-            (law.force(bond, &eta, strain, [0.0; D]), law.energy(bond, strain))
-        }
-    }
-
-    #[test]
-    fn force_is_the_derivative_of_energy_and_strain_keeps_its_digits() {
-        fn check(law: impl BondLaw<3>, eta: [f64; 3], small: bool) {
-            let bond = Bond::new([3.0e-3, -1.0e-3, 2.0e-3], 14f64.sqrt() * 1e-3, 7.0);
-            let (force, _) = response(law, &bond, eta, small);
-            for d in 0..3 {
-                let h = 1e-9;
-                let (mut plus, mut minus) = (eta, eta);
-                plus[d] += h;
-                minus[d] -= h;
-                let energy = |eta| response(law, &bond, eta, small).1;
-                let slope = (energy(plus) - energy(minus)) / (2.0 * h);
-                // Truncation h²/|ξ|² ≈ 1e-13 and round-off 1e-16 |ξ|/h ≈ 4e-10 of the difference quotient.
-                assert!((slope - force[d]).abs() < 1e-8 * force[0].abs(), "{d}: {slope} {}", force[d]);
-            }
-            let tiny = bond.xi.map(|x| 1e-14 * x);
-            assert!((law.strain(&bond, &tiny) / law.strain_at(1e-14) - 1.0).abs() < 1e-12);
-        }
-        check(BondBased, [2.0e-4, 5.0e-5, -1.0e-4], false);
-        check(BondBased, [1.0e-5, 5.0e-6, -4.0e-6], true);
-        check(BondBasedLinear, [2.0e-4, 5.0e-5, -1.0e-4], false);
-    }
 
     #[test]
     fn small_forms_are_the_exact_ones_to_rounding() {

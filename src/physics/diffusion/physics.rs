@@ -1,0 +1,142 @@
+//! A body in which something diffuses: Ċ = L C + S.
+//!
+//! An equation of first order in one component. What is kept where nothing enters is the amount Σ C V, which the standard
+//! scheme keeps to rounding.
+
+use std::ops::Range;
+
+use super::Diffusion;
+use crate::execution::Exec;
+use crate::family::{Body, BondStates};
+use crate::field::{Field, Values};
+use crate::parallel;
+use crate::physics::{Balance, Column, Content, FieldInfo, Physics, Points};
+use crate::unknown::{Numbers, Unknown, Vectors};
+use crate::visit::Visitor;
+
+/// Concentrations on one body, and where they stand.
+pub struct Diffusing<const D: usize> {
+    pub body: Body<D>,
+    pub diffusion: Diffusion,
+    /// C by slot, in whatever unit its user has.
+    pub concentration: Vec<f64>,
+    /// Ċ, per second.
+    rate: Vec<f64>,
+    bonds: BondStates,
+    exec: Exec,
+}
+
+impl<const D: usize> Diffusing<D> {
+    /// Without any concentration.
+    pub fn new(body: Body<D>, diffusion: Diffusion) -> Self {
+        let n = body.cloud.n_slots();
+        let bonds = BondStates::whole(&body);
+        let (concentration, rate) = (vec![0.0; n], vec![0.0; n]);
+        Diffusing { body, diffusion, concentration, rate, bonds, exec: Exec::default() }
+    }
+}
+
+type FieldOf<const D: usize> = fn(&Diffusing<D>, usize) -> f64;
+
+const CONCENTRATION: FieldInfo = FieldInfo { name: "concentration", unit: "", about: "C, in the unit of the case" };
+const RATE: FieldInfo = FieldInfo { name: "rate", unit: "1/s", about: "rate of C, sources included" };
+/// The fields of what diffuses.
+pub const FIELDS: &[FieldInfo] = &[CONCENTRATION, RATE];
+
+impl<const D: usize> Diffusing<D> {
+    const FIELDS: &'static [(FieldInfo, FieldOf<D>)] =
+        &[(CONCENTRATION, |body, slot| body.concentration[slot]), (RATE, |body, slot| body.rate[slot])];
+}
+
+impl<const D: usize> Physics for Diffusing<D> {
+    fn unknown(&mut self) -> Unknown<'_> {
+        let (value, rate) = (&mut self.concentration[..], &mut self.rate[..]);
+        Unknown {
+            vectors: Numbers::Double(Vectors { value, velocity: &mut [], rate, damped: None }),
+            components: 1,
+            inertia: 1.0,
+            negligible: 0.0,
+        }
+    }
+
+    fn evaluate(&mut self) {
+        let Diffusing { body, diffusion, concentration, rate, exec, .. } = self;
+        diffusion.rate(body, exec, concentration, rate);
+    }
+
+    fn evolve(&mut self, _: f64) {
+        self.evaluate();
+    }
+
+    fn stable_step(&self) -> f64 {
+        self.diffusion.stable_step(&self.body)
+    }
+
+    fn fields(&self) -> &'static [FieldInfo] {
+        FIELDS
+    }
+
+    fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field> {
+        let (info, value) = Self::FIELDS.iter().find(|(info, _)| info.name == name)?;
+        let slots = &self.body.cloud.slots[points];
+        let values = parallel::map(slots.len(), &|k| value(self, slots[k] as usize));
+        Some(Field { name: info.name, unit: info.unit, values: Values::Scalar(values) })
+    }
+
+    fn points(&self) -> &dyn Points {
+        &self.body
+    }
+
+    fn states(&self) -> &BondStates {
+        &self.bonds
+    }
+
+    fn n_bonds(&self) -> [u64; 2] {
+        [self.bonds.count(), 0]
+    }
+
+    /// No motion; the amount stands in the first component.
+    fn motion(&mut self) -> (f64, [f64; 3]) {
+        let Diffusing { body, concentration, exec, .. } = self;
+        (0.0, [super::mass(&body.cloud, exec, concentration), 0.0, 0.0])
+    }
+
+    fn content(&mut self) -> Content {
+        let Diffusing { body, concentration, exec, .. } = self;
+        let sizes: Vec<f64> = concentration.iter().map(|c| c.abs()).collect();
+        Content { stored: 0.0, scale: super::mass(&body.cloud, exec, &sizes), angular_momentum: [0.0; 3] }
+    }
+
+    /// What is there, what came in, and what of it is missing over the size of what is there.
+    fn columns(&self, b: &Balance) -> Vec<Column> {
+        let missing = if b.momentum_scale > 0.0 { b.momentum_defect / b.momentum_scale } else { 0.0 };
+        vec![
+            Column::new("amount", b.momentum[0]),
+            Column::new("supplied", b.impulse[0]),
+            Column::new("imbalance", missing),
+        ]
+    }
+
+    fn first_bad(&mut self) -> Option<(&'static str, f64, usize)> {
+        [("concentration", &self.concentration), ("rate", &self.rate)].into_iter().find_map(|(name, field)| {
+            let slots = &self.body.cloud.slots;
+            let bad = slots.iter().position(|&slot| !field[slot as usize].is_finite())?;
+            Some((name, field[slots[bad] as usize], bad))
+        })
+    }
+
+    fn visit(&mut self, visitor: &mut dyn Visitor) {
+        visitor.doubles("concentration", &mut self.concentration);
+        visitor.doubles("rate", &mut self.rate);
+    }
+
+    fn hash(&mut self, hasher: &mut blake3::Hasher) {
+        for &slot in &self.body.cloud.slots {
+            hasher.update(&self.concentration[slot as usize].to_le_bytes());
+        }
+    }
+
+    fn memory(&self) -> usize {
+        2 * size_of_val(&self.concentration[..]) + size_of_val(self.bonds.words())
+    }
+}
