@@ -48,7 +48,7 @@ enum What {
 
 /// All kernels: what, law, path and dimension, precision.
 #[rustfmt::skip] // a table
-pub const KERNELS: [(&str, Maker); 30] = [
+pub const KERNELS: [(&str, Maker); 32] = [
     ("force/bond_based/lattice2d/double", |e, i| plate::<_, Double>(BondBased, What::Force, e, i)),
     ("force/bond_based/lattice2d/single", |e, i| plate::<_, Single>(BondBased, What::Force, e, i)),
     ("force/bond_based/lattice2d/mixed", |e, i| plate::<_, Mixed>(BondBased, What::Force, e, i)),
@@ -76,6 +76,8 @@ pub const KERNELS: [(&str, Maker); 30] = [
     ("energy/bond_based/lattice3d/double", |e, i| solid::<_, Double>(BondBased, What::Energy, e, i)),
     ("energy/bond_based/cloud3d/double", |e, i| cloud::<_, Double>(BondBased, What::Energy, e, i)),
     ("force/state_based/lattice3d/double", |e, i| solid::<_, Double>(BondBased, What::TwoPasses, e, i)),
+    ("force/state_based/lattice3d/single", |e, i| solid::<_, Single>(BondBased, What::TwoPasses, e, i)),
+    ("force/state_based/lattice3d/mixed", |e, i| solid::<_, Mixed>(BondBased, What::TwoPasses, e, i)),
     ("force/state_based/cloud3d/double", |e, i| cloud::<_, Double>(BondBased, What::TwoPasses, e, i)),
     ("collocation/bond_based/lattice2d/double", |e, i| collocation(filled(e.plate), 13, i)),
     ("collocation/bond_based/lattice3d/double", |e, i| collocation(filled(e.solid), 33, i)),

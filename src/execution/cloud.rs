@@ -309,8 +309,8 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         let inverse = square.inverse_root();
         let length = square * inverse;
         let weight = self.weigh::<V, PLAIN>(first, length, volume);
-        let (spring, memory) = (weight * inverse, V::splat(0.0));
-        let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring, memory };
+        let (spring, moment, memory) = (weight * inverse, weight * length, V::splat(0.0));
+        let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring, moment, memory };
         let (mut relative, mut added) = ([V::splat(0.0); I], [V::splat(0.0); A]);
         for part in 0..(I + A).div_ceil(4) {
             let there = unsafe { V::gather(self.input.as_ptr().add(part * self.n_points()), index) };

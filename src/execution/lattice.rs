@@ -34,6 +34,7 @@ struct Row<const D: usize, B> {
     inverse_square: B,
     weight: B,
     spring: B,
+    moment: B,
 }
 
 impl<'a, const D: usize, B: Number> View<'a, D, B> {
@@ -41,7 +42,8 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
     pub fn new(families: &'a LatticeFamilies<D>, weights: &'a [f64], within: Option<&'a [u32]>) -> Self {
         assert_eq!(weights.len(), families.offsets.len(), "one weight an offset");
         let rows = families.offsets.iter().zip(weights).map(|(offset, &weight)| {
-            let Bond { xi, length, inverse_square, weight, spring, .. } = Bond::new(offset.xi, offset.length, weight);
+            let Bond { xi, length, inverse_square, weight, spring, moment, .. } =
+                Bond::new(offset.xi, offset.length, weight);
             Row {
                 shift: offset.shift,
                 xi: xi.map(B::from_f64),
@@ -49,6 +51,7 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
                 inverse_square: B::from_f64(inverse_square),
                 weight: B::from_f64(weight),
                 spring: B::from_f64(spring),
+                moment: B::from_f64(moment),
             }
         });
         View {
@@ -298,6 +301,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             inverse_square: V::broadcast(row.inverse_square),
             weight: V::broadcast(row.weight),
             spring: V::broadcast(row.spring),
+            moment: V::broadcast(row.moment),
             memory: V::splat(0.0),
         }
     }

@@ -15,6 +15,8 @@ pub struct Bond<const D: usize, L> {
     pub weight: L,
     /// weight/|ξ|
     pub spring: L,
+    /// weight × |ξ|
+    pub moment: L,
     /// What the law has noted of this bond, see [`BondLaw::MEMORY`]; zero where it notes nothing.
     pub memory: L,
 }
@@ -22,7 +24,8 @@ pub struct Bond<const D: usize, L> {
 impl<const D: usize> Bond<D, f64> {
     /// One bond, from ξ (m), |ξ| (m) and its weight.
     pub fn new(xi: [f64; D], length: f64, weight: f64) -> Self {
-        Bond { xi, length, inverse_square: 1.0 / (length * length), weight, spring: weight / length, memory: 0.0 }
+        let [inverse_square, spring, moment] = [1.0 / (length * length), weight / length, weight * length];
+        Bond { xi, length, inverse_square, weight, spring, moment, memory: 0.0 }
     }
 }
 

@@ -47,8 +47,6 @@ pub trait Physics: Send {
     /// Largest stable step, s: of velocity Verlet for equations of second order, of forward Euler for those of first.
     fn stable_step(&self) -> f64;
 
-    /// The fields that it has, in the order of the lists that users see.
-    fn fields(&self) -> &'static [FieldInfo];
     /// A field at these points, in point order; None if there is no such field.
     fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field>;
     /// The points as they are now.
@@ -134,10 +132,9 @@ pub struct FieldInfo {
     pub about: &'static str,
 }
 
-/// The fields of every physics, each name once.
+/// The fields that cases may ask for: those of elastic bodies, the only ones that a case can make yet.
 pub fn all_fields() -> impl Iterator<Item = &'static FieldInfo> {
-    let (first, second) = (elasticity::FIELDS, diffusion::FIELDS);
-    first.iter().chain(second.iter().filter(|field| first.iter().all(|other| other.name != field.name)))
+    elasticity::fields()
 }
 
 /// The points of a body, whatever its dimension.

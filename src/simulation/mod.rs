@@ -18,6 +18,7 @@ use crate::output::writer::{Order, Output};
 use crate::output::writer_thread::{Batch, WriterThread};
 use crate::solver::statics::LoadStep;
 use crate::solver::{Clock, Solver};
+use crate::visit::Visitor;
 
 /// A model that can be stepped and looked at: a [`Model`], or what stands for one.
 pub trait Stepper: Source + Send {
@@ -36,6 +37,8 @@ pub trait Stepper: Source + Send {
     fn conclude(&mut self, _solver: &Solver, _clock: &Clock) -> Result<()> {
         Ok(())
     }
+    /// Shows everything that changes in a run but the clock.
+    fn visit(&mut self, visitor: &mut dyn Visitor);
     /// What the load steps of static solvers took.
     fn load_steps(&self) -> &[LoadStep];
     /// Takes a step that nobody observes.
@@ -391,6 +394,7 @@ mod tests {
     impl Stepper for Still {
         fn start(&mut self) {}
         fn hand_over(&mut self, _: &Solver, _: f64) {}
+        fn visit(&mut self, _: &mut dyn Visitor) {}
         fn load_steps(&self) -> &[LoadStep] {
             &[]
         }

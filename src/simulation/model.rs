@@ -11,6 +11,7 @@ use crate::physics::{Adapted, Balance, Column};
 use crate::problem::Problem;
 use crate::solver::statics::LoadStep;
 use crate::solver::{Clock, Solver};
+use crate::visit::Visitor;
 
 /// A problem, and facts and points of it that are shared with writers.
 pub struct Model {
@@ -121,6 +122,9 @@ impl Stepper for Model {
     }
     fn conclude(&mut self, solver: &Solver, clock: &Clock) -> Result<()> {
         self.problem.conclude(solver, clock)
+    }
+    fn visit(&mut self, visitor: &mut dyn Visitor) {
+        self.problem.visit(visitor);
     }
     fn load_steps(&self) -> &[LoadStep] {
         &self.problem.load_steps

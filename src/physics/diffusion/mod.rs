@@ -65,7 +65,7 @@ impl Flux {
     }
 }
 
-pub use physics::{Diffusing, FIELDS};
+pub use physics::Diffusing;
 
 /// L C on one body.
 #[derive(Debug, Clone)]

@@ -38,14 +38,13 @@ impl<const D: usize> Diffusing<D> {
 
 type FieldOf<const D: usize> = fn(&Diffusing<D>, usize) -> f64;
 
-const CONCENTRATION: FieldInfo = FieldInfo { name: "concentration", unit: "", about: "C, in the unit of the case" };
-const RATE: FieldInfo = FieldInfo { name: "rate", unit: "1/s", about: "rate of C, sources included" };
-/// The fields of what diffuses.
-pub const FIELDS: &[FieldInfo] = &[CONCENTRATION, RATE];
-
 impl<const D: usize> Diffusing<D> {
-    const FIELDS: &'static [(FieldInfo, FieldOf<D>)] =
-        &[(CONCENTRATION, |body, slot| body.concentration[slot]), (RATE, |body, slot| body.rate[slot])];
+    const FIELDS: &'static [(FieldInfo, FieldOf<D>)] = &[
+        (FieldInfo { name: "concentration", unit: "", about: "C, in the unit of its user" }, |body, slot| {
+            body.concentration[slot]
+        }),
+        (FieldInfo { name: "rate", unit: "1/s", about: "rate of C, sources included" }, |body, slot| body.rate[slot]),
+    ];
 }
 
 impl<const D: usize> Physics for Diffusing<D> {
@@ -70,10 +69,6 @@ impl<const D: usize> Physics for Diffusing<D> {
 
     fn stable_step(&self) -> f64 {
         self.diffusion.stable_step(&self.body)
-    }
-
-    fn fields(&self) -> &'static [FieldInfo] {
-        FIELDS
     }
 
     fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field> {

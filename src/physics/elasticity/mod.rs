@@ -175,20 +175,24 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         Values::Vector(gather(slots, &|slot| embed::<D>(&std::array::from_fn(|d| parts[d][slot].to_f64()))))
     }
 
-    /// The fields, each with what computes it at some slots. A line here is all that a field takes.
+    /// The fields, each with what computes it at some slots: a line here is all that a field takes.
     const FIELDS: &'static [(FieldInfo, FieldOf<D, P>)] = &[
-        (DISPLACEMENT, |body, slots| body.vectors(&body.state.displacement, slots)),
-        (VELOCITY, |body, slots| body.vectors(&body.state.velocity, slots)),
-        (FORCE, |body, slots| body.vectors(&body.state.force, slots)),
-        (DAMAGE, |body, slots| {
+        (info("displacement", "m", "u"), |body, slots| body.vectors(&body.state.displacement, slots)),
+        (info("velocity", "m/s", "its rate"), |body, slots| body.vectors(&body.state.velocity, slots)),
+        (info("force", "N/m³", "density of internal force and load"), |body, slots| {
+            body.vectors(&body.state.force, slots)
+        }),
+        (info("damage", "", "φ, 0 whole to 1 free of all bonds"), |body, slots| {
             let damage = body.damage();
             Values::Scalar(gather(slots, &|slot| damage[slot]))
         }),
-        (STRAIN_ENERGY, |body, slots| {
+        (info("strain_energy", "J/m³", "W, density of what bonds hold"), |body, slots| {
             let density = body.energy_density();
             Values::Scalar(gather(slots, &|slot| density[slot].to_f64()))
         }),
-        (SCHEME, |body, slots| Values::Scalar(gather(slots, &|slot| body.material.scheme(slot)))),
+        (info("scheme", "", "1 where bonds are summed, 0 where a point has a row of collocation"), |body, slots| {
+            Values::Scalar(gather(slots, &|slot| body.material.scheme(slot)))
+        }),
     ];
 }
 
@@ -198,14 +202,11 @@ type FieldOf<const D: usize, P> = fn(&mut Elasticity<D, P>, &[u32]) -> Values;
 const fn info(name: &'static str, unit: &'static str, about: &'static str) -> FieldInfo {
     FieldInfo { name, unit, about }
 }
-const DISPLACEMENT: FieldInfo = info("displacement", "m", "u");
-const VELOCITY: FieldInfo = info("velocity", "m/s", "its rate");
-const FORCE: FieldInfo = info("force", "N/m³", "density of all forces, loads included");
-const DAMAGE: FieldInfo = info("damage", "", "share of the family, by volume, whose bonds are broken");
-const STRAIN_ENERGY: FieldInfo = info("strain_energy", "J/m³", "density of what bonds hold");
-const SCHEME: FieldInfo = info("scheme", "", "1 where bonds are summed, 0 where points have a row");
+
 /// The fields of elastic bodies.
-pub const FIELDS: &[FieldInfo] = &[DISPLACEMENT, VELOCITY, FORCE, DAMAGE, STRAIN_ENERGY, SCHEME];
+pub(super) fn fields() -> impl Iterator<Item = &'static FieldInfo> {
+    Elasticity::<2, Double>::FIELDS.iter().map(|(info, _)| info)
+}
 
 impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
     fn unknown(&mut self) -> Unknown<'_> {
@@ -250,10 +251,6 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
             exec: &mut Exec::default(),
         };
         self.material.stable_step(&mut on, self.density)
-    }
-
-    fn fields(&self) -> &'static [FieldInfo] {
-        FIELDS
     }
 
     fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field> {

@@ -82,7 +82,7 @@ pub(crate) const FORCE: [f64; 7] = [
     0.2095051172811721,
 ];
 /// The same for single precision: the first terms of Taylor's series, relative error 5e-9.
-const FORCE_SINGLE: [f64; 4] = [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 128.0];
+pub(crate) const FORCE_SINGLE: [f64; 4] = [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 128.0];
 
 /// (√(1 + q) − 1)/q on |q| ≤ 0.01, as [`FORCE`]: relative error 4e-18.
 pub(crate) const STRETCH: [f64; 7] = [
@@ -95,7 +95,7 @@ pub(crate) const STRETCH: [f64; 7] = [
     0.016115190681192295,
 ];
 /// The same for single precision: relative error 5e-10.
-const STRETCH_SINGLE: [f64; 4] = [1.0 / 2.0, -1.0 / 8.0, 1.0 / 16.0, -5.0 / 128.0];
+pub(crate) const STRETCH_SINGLE: [f64; 4] = [1.0 / 2.0, -1.0 / 8.0, 1.0 / 16.0, -5.0 / 128.0];
 
 /// sum + factor (ξ + η)
 #[inline(always)]
