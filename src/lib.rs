@@ -11,7 +11,7 @@
 //! - [`refinement`] splits and merges the cells of x where the solution asks for it.
 //! - [`execution`] owns Σ: the only loops over bonds. [`lane`] is the number that a law is written on.
 //! - [`conditions`] own values and loads from outside; [`solver`] owns t; [`output`] only looks.
-//! - [`case`] turns a file into a [`simulation::Simulation`]; [`verify`] proves that all of it is right.
+//! - [`case`] turns a file into a [`simulation::Simulation`]; the package `bondwise-studies` proves that all of it is right.
 
 pub mod case;
 pub mod conditions;
@@ -31,7 +31,6 @@ pub mod refinement;
 pub mod simulation;
 pub mod solver;
 pub mod unknown;
-pub mod verify;
 pub mod visit;
 
 pub use error::{Error, Result};

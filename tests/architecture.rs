@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules by level; a module may import its own and lower levels only (see ARCHITECTURE.md).
-const LEVELS: [&[&str]; 11] = [
+const LEVELS: [&[&str]; 10] = [
     &["field", "lane", "expression", "parallel", "unknown", "visit"],
     &["geometry"],
     &["family", "refinement"],
@@ -15,7 +15,6 @@ const LEVELS: [&[&str]; 11] = [
     &["output"],
     &["simulation"],
     &["case"],
-    &["verify"],
 ];
 
 /// Imports that the levels would allow and the table forbids.

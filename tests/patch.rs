@@ -14,7 +14,7 @@ use bondwise::geometry::{Arrangement, Cloud, Shape};
 use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
 use bondwise::physics::elasticity::moduli::{Hypothesis, micromodulus};
 use bondwise::physics::elasticity::{Bonds, State};
-use bondwise::verify::discrete::discrete_moduli;
+use bondwise_studies::discrete::discrete_moduli;
 use common::Held;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

@@ -20,7 +20,7 @@ use bondwise::physics::elasticity::moduli::{Hypothesis, Stiffness, micromodulus}
 use bondwise::physics::elasticity::{Bonds, State};
 use bondwise::physics::failure::CriticalStretch;
 use bondwise::simulation::Simulation;
-use bondwise::verify::discrete::discrete_moduli;
+use bondwise_studies::discrete::discrete_moduli;
 use common::Held;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

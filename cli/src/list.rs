@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use bondwise::Result;
 use bondwise::case::{Case, bundled, schema_of};
-use bondwise::verify::STUDIES;
+use bondwise_studies::STUDIES;
 use serde_json::Value;
 
 use crate::bench::PROBLEMS;

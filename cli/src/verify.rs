@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use bondwise::expression::nearest;
 use bondwise::output::picture::{write_animation, write_png};
-use bondwise::verify::bar::Micromodulus;
-use bondwise::verify::{self, Measure, Outcome, Row, STUDIES, Study};
 use bondwise::{Error, Result};
+use bondwise_studies::bar::Micromodulus;
+use bondwise_studies::{self as verify, Measure, Outcome, Row, STUDIES, Study};
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 

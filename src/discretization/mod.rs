@@ -5,7 +5,7 @@ pub mod graded;
 pub mod hybrid;
 pub mod influence;
 pub mod moments;
-pub(crate) mod quadrature;
+pub mod quadrature;
 pub mod standard;
 pub mod surface;
 pub mod volume;

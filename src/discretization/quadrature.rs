@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 ///
 /// The roots of the Legendre polynomial Pₙ by Newton's method from Tricomi's estimate; w = 1/((1 −
 /// x²) P′ₙ(x)²) on the unit interval.
-pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     let mut rule = vec![(0.5, 0.0); n];
     for i in 0..n.div_ceil(2) {
         let mut x = (PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
@@ -38,7 +38,7 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
 }
 
 /// ∫ f from `low` to `high` with `n` points, at most 40.
-pub(crate) fn integrate(f: impl Fn(f64) -> f64, low: f64, high: f64, n: usize) -> f64 {
+pub fn integrate(f: impl Fn(f64) -> f64, low: f64, high: f64, n: usize) -> f64 {
     use std::sync::OnceLock;
     // Kept, because nested integrals ask for the same rule at every point.
     static RULES: [OnceLock<Vec<(f64, f64)>>; 41] = [const { OnceLock::new() }; 41];

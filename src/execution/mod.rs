@@ -269,7 +269,7 @@ impl Exec {
         self.each_path::<D, I, 0, O, P, _, _>(body, weights, states, (input, []), memory, output, kernel, rule)
     }
 
-    #[allow(clippy::too_many_arguments)]
+    #[allow(clippy::too_many_arguments, clippy::type_complexity)] // as above; two lists of fields
     fn each_path<const D: usize, const I: usize, const A: usize, const O: usize, P, K, R>(
         &mut self,
         body: &Body<D>,

@@ -140,6 +140,7 @@ macro_rules! define {
 }
 each_influence!(define);
 
+#[allow(clippy::derivable_impls)] // the list would have to mark one
 impl Default for InfluenceFunction {
     fn default() -> Self {
         InfluenceFunction::Constant
