@@ -7,6 +7,8 @@
 //! k(δ, h) = c₀ (δ₀/δ)^(D+1) ω(|ξ|/δ) β(ξ; h, δ)
 //! ```
 //!
+//! and β the part of the cell within the horizon, wherever in its cell the point is,
+//!
 //! the weight of a bond from x (h, δ, V) to x′ (h′, δ′, V′) is V′ times
 //!
 //! ```text
@@ -39,11 +41,14 @@ pub struct Scaling {
 pub(super) struct End {
     pub size: f64,
     pub horizon: f64,
+    /// From the point to the centre of its cell.
+    pub shift: [f64; 3],
 }
 
 impl Grading {
     fn end(&self, slot: usize) -> End {
-        End { size: self.sizes[slot], horizon: self.horizons[slot] }
+        let shift = self.shifts.get(slot).copied().unwrap_or_default();
+        End { size: self.sizes[slot], horizon: self.horizons[slot], shift }
     }
 }
 
@@ -71,38 +76,53 @@ impl Scaling {
     /// The largest distance of any two neighbours, m.
     fn reach<const D: usize>(&self, grading: &Grading) -> f64 {
         let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
-        self.rule.reach::<D>(largest(&grading.sizes), largest(&grading.horizons))
+        let shift = grading.shifts.iter().map(norm).fold(0.0, f64::max);
+        self.rule.reach::<D>(largest(&grading.sizes), largest(&grading.horizons)) + shift
+    }
+
+    /// From one end, `xi` away, to the place that decides how much of the cell of the other counts: its centre, or the point
+    /// itself where cells count whole or not at all.
+    fn place<const D: usize>(&self, xi: &Vector<D>, there: End) -> Vector<D> {
+        match self.rule {
+            PartialVolume::None => *xi,
+            PartialVolume::Ramp | PartialVolume::Exact => std::array::from_fn(|d| xi[d] + there.shift[d]),
+        }
     }
 
     /// Whether the bond has any weight at one of its ends.
     fn touches<const D: usize>(&self, rule: Rule, here: End, there: End, xi: &Vector<D>) -> bool {
-        let length = norm(xi);
-        let touches = |horizon, size| match self.rule.radial(length, size, horizon) {
+        let (to, back) = (self.place(xi, there), self.place(&xi.map(|x| -x), here));
+        let touches = |place: &Vector<D>, size, horizon| match self.rule.radial(norm(place), size, horizon) {
             Some(beta) => beta > 0.0,
-            None => self.rule.touches(xi, size, horizon),
+            None => self.rule.touches(place, size, horizon),
         };
         match rule {
-            Rule::Source => touches(here.horizon, there.size),
-            Rule::Average => touches(here.horizon.max(there.horizon), here.size.max(there.size)),
-            Rule::Dual => touches(here.horizon, there.size) || touches(there.horizon, here.size),
+            Rule::Source => touches(&to, there.size, here.horizon),
+            Rule::Average => {
+                let [size, horizon] = [here.size.max(there.size), here.horizon.max(there.horizon)];
+                touches(&to, size, horizon) || touches(&back, size, horizon)
+            }
+            Rule::Dual => touches(&to, there.size, here.horizon) || touches(&back, here.size, there.horizon),
         }
     }
 
     /// β and k of a bond, per unit of volume at its other end.
     pub(super) fn bond<const D: usize>(&self, rule: Rule, here: End, there: End, xi: &Vector<D>) -> [f64; 2] {
         let length = norm(xi);
-        let part = |horizon: f64, size: f64| {
-            let beta = self.rule.radial(length, size, horizon).unwrap_or_else(|| self.rule.fraction(xi, size, horizon));
+        let (to, back) = (self.place(xi, there), self.place(&xi.map(|x| -x), here));
+        let part = |horizon: f64, place: &Vector<D>, size: f64| {
+            let radial = self.rule.radial(norm(place), size, horizon);
+            let beta = radial.unwrap_or_else(|| self.rule.fraction(place, size, horizon));
             let scale = (self.horizon / horizon).powi(D as i32 + 1);
             [beta, self.strength * scale * self.influence.quadrature_value(length / horizon) * beta]
         };
         let mean = |a: [f64; 2], b: [f64; 2]| [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
         // Sums of two and of two pairs: the same bits seen from the other end.
-        let both = |horizon| mean(part(horizon, here.size), part(horizon, there.size));
+        let both = |horizon| mean(part(horizon, &back, here.size), part(horizon, &to, there.size));
         match rule {
-            Rule::Source => part(here.horizon, there.size),
+            Rule::Source => part(here.horizon, &to, there.size),
             Rule::Average => mean(both(here.horizon), both(there.horizon)),
-            Rule::Dual => mean(part(here.horizon, there.size), part(there.horizon, here.size)),
+            Rule::Dual => mean(part(here.horizon, &to, there.size), part(there.horizon, &back, here.size)),
         }
     }
 
@@ -113,7 +133,7 @@ impl Scaling {
         point: usize,
         mut each: impl FnMut(usize, usize, &Vector<D>, [f64; 2]),
     ) {
-        let uniform = End { size: body.cloud.spacing, horizon: body.horizon };
+        let uniform = End { size: body.cloud.spacing, horizon: body.horizon, shift: [0.0; 3] };
         let end = |slot| body.grading.as_ref().map_or(uniform, |grading| grading.end(slot));
         // Where all ends are alike, so are the rules.
         let rule = body.grading.as_ref().map_or(Rule::Source, |grading| grading.rule);
@@ -155,5 +175,29 @@ impl Scaling {
             weights: BondWeights::stored(CloudWeights::by_bond(weights.into(), smallest)),
             volumes: BondWeights::stored(CloudWeights::by_fraction(fractions.into(), smallest)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_part_of_a_cell_within_the_horizon_counts_wherever_its_point_is() {
+        let scaling = Scaling { strength: 1.0, horizon: 3.0, influence: Influence::Linear, rule: PartialVolume::Exact };
+        let here = End { size: 1.0, horizon: 3.0, shift: [0.1, -0.2, 0.0] };
+        let there = End { size: 0.7, horizon: 2.4, shift: [-0.3, 0.15, 0.0] };
+        let xi = [2.5, 1.2];
+        let [beta, _] = scaling.bond(Rule::Source, here, there, &xi);
+        let expected = PartialVolume::Exact.fraction(&[2.5 - 0.3, 1.2 + 0.15], 0.7, 3.0);
+        assert!(beta == expected && beta > 0.0 && beta < 1.0, "{beta} {expected}");
+        for rule in [Rule::Average, Rule::Dual] {
+            let back = scaling.bond(rule, there, here, &xi.map(|x| -x));
+            assert_eq!(scaling.bond(rule, here, there, &xi), back, "{rule:?}: both ends see the same bits");
+        }
+        // Whole or not at all: the point decides.
+        let whole = Scaling { rule: PartialVolume::None, ..scaling };
+        assert_eq!(whole.bond(Rule::Source, here, there, &[2.9, 0.0])[0], 1.0);
+        assert_eq!(whole.bond(Rule::Source, here, there, &[3.1, 0.0])[0], 0.0);
     }
 }

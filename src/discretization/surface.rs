@@ -55,7 +55,7 @@ impl Scaling {
     /// Weighted, and with β V′ behind.
     pub fn complete<const D: usize>(&self, size: f64, horizon: f64, mut each: impl FnMut(&Bond<D, f64>, f64)) {
         let reach = (self.rule.reach::<D>(size, horizon) / size).ceil() as usize;
-        let (end, volume) = (End { size, horizon }, size.powi(D as i32));
+        let (end, volume) = (End { size, horizon, shift: [0.0; 3] }, size.powi(D as i32));
         for_each_cell([2 * reach + 1; D], |cell| {
             let xi = cell.map(|c| (c as f64 - reach as f64) * size);
             if cell != [reach; D] && self.rule.touches(&xi, size, horizon) {

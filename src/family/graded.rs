@@ -43,6 +43,9 @@ pub struct Grading {
     pub horizons: Vec<f64>,
     /// Side of the point's cell, m.
     pub sizes: Vec<f64>,
+    /// From the point to the centre of its cell, m; empty where every point is in the centre of its own. What follows from
+    /// whole families, such as surface corrections, takes points as centred.
+    pub shifts: Vec<[f64; 3]>,
 }
 
 /// What was done to the families of a body when some of its points were replaced. The default: all are new.

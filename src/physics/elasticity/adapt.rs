@@ -66,7 +66,8 @@ impl<const D: usize> Adaptation<D> {
     /// Horizons and sizes of the cells.
     pub fn grading(&self) -> Grading {
         let sizes = self.cells.list().iter().map(|cell| self.cells.size(cell.level)).collect();
-        Grading { rule: self.rule, horizons: horizons(&self.cells, self.ratio, self.transition), sizes }
+        let horizons = horizons(&self.cells, self.ratio, self.transition);
+        Grading { rule: self.rule, horizons, sizes, shifts: Vec::new() }
     }
 
     /// Points that a coarser one sees although finer cells are asked for there (the visibility criterion of Bobaru et al.

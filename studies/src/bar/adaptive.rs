@@ -2,10 +2,9 @@
 //!
 //! One level of refinement. Nodes of level 1 stay for ever; nodes of level 2 are the midpoints between them.
 
-use super::dynamics::Motion;
 use super::grid::Grid;
 use super::micromodulus::Micromodulus;
-use super::model::{Bar, Bonds, Cover, Rule};
+use super::model::{Bar, Cover, Model, Motion, Rule};
 
 /// The horizons in a refined zone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +45,7 @@ pub struct Books {
 }
 
 /// A bar in motion on a grid that follows it.
-pub struct Adaptive {
+pub struct Adaptive<M> {
     how: Adaptation,
     /// Nodes and horizon of level 1.
     base: Vec<f64>,
@@ -54,41 +53,43 @@ pub struct Adaptive {
     /// Of each interval between nodes of level 1: whether its midpoint is a node.
     split: Vec<bool>,
     pub grid: Grid,
-    pub bonds: Bonds,
+    pub model: M,
     pub motion: Motion,
     pub books: Books,
 }
 
-impl Adaptive {
+impl<M: Model> Adaptive<M> {
     /// At rest on vertex nodes `base` with the displacements u.
     pub fn new(how: Adaptation, base: Vec<f64>, horizon: f64, u: impl Fn(f64) -> f64) -> Self {
         let split = vec![false; base.len() - 1];
         let bar = bar(&how, &base, horizon, &split);
         let motion = Motion::released(bar.grid.at.iter().map(|&x| u(x)).collect());
         let books = Books::default();
-        Self { how, base, horizon, split, bonds: bar.bonds(), grid: bar.grid, motion, books }
+        Self { how, base, horizon, split, model: M::new(&bar), grid: bar.grid, motion, books }
     }
 
     /// Refines and coarsens, once.
     pub fn adapt(&mut self) {
-        let wanted = self.wanted();
+        let energy = self.energy();
+        let wanted = self.wanted(&energy);
         if wanted != self.split {
-            self.change(wanted);
+            self.change(wanted, self.grid.sum(&energy));
         }
         let (sum, calls) = self.books.nodes_called;
         self.books.nodes_called = (sum + self.grid.count(), calls + 1);
     }
 
-    fn change(&mut self, wanted: Vec<bool>) {
-        let before = (self.motion.total_energy(&self.bonds), self.motion.momentum(&self.bonds));
+    /// `energy`: in all, before.
+    fn change(&mut self, wanted: Vec<bool>, energy: f64) {
+        let momentum = self.grid.sum(&self.motion.v);
         let bar = bar(&self.how, &self.base, self.horizon, &wanted);
         let carry = |values: &[f64]| bar.grid.at.iter().map(|&x| quadratic(&self.grid.at, values, x)).collect();
         self.motion = Motion { u: carry(&self.motion.u), v: carry(&self.motion.v) };
-        self.bonds = bar.bonds();
+        self.model = self.model.replaced(&bar);
         self.grid = bar.grid;
         self.split = wanted;
-        let energy = self.motion.total_energy(&self.bonds) - before.0;
-        let momentum = self.motion.momentum(&self.bonds) - before.1;
+        let energy = self.total_energy() - energy;
+        let momentum = self.grid.sum(&self.motion.v) - momentum;
         let books = &mut self.books;
         books.changes += 1;
         books.energy += energy;
@@ -100,9 +101,22 @@ impl Adaptive {
         books.nodes = Some((fewest.min(n), most.max(n)));
     }
 
+    /// Energy density of every node: ½ v² and the strain energy.
+    fn energy(&mut self) -> Vec<f64> {
+        let mut energy = vec![0.0; self.grid.count()];
+        self.model.energy(&self.motion.u, &mut energy);
+        energy.iter_mut().zip(&self.motion.v).for_each(|(energy, v)| *energy += 0.5 * v * v);
+        energy
+    }
+
+    /// Σ V (½ v² + W)
+    pub fn total_energy(&mut self) -> f64 {
+        let energy = self.energy();
+        self.grid.sum(&energy)
+    }
+
     /// The intervals next to a level-1 node that is to be refined.
-    fn wanted(&self) -> Vec<bool> {
-        let energy = self.motion.energy(&self.bonds);
+    fn wanted(&self, energy: &[f64]) -> Vec<bool> {
         let trigger = self.how.threshold * energy.iter().copied().fold(0.0, f64::max);
         let reach = self.how.buffer * self.horizon * (1.0 + 1e-9);
         let hot: Vec<f64> = (0..energy.len()).filter(|&i| energy[i] >= trigger).map(|i| self.grid.at[i]).collect();
@@ -166,6 +180,7 @@ fn quadratic(at: &[f64], values: &[f64], x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::engine::EngineBar;
     use super::*;
 
     #[test]
@@ -189,7 +204,7 @@ mod tests {
             rule: Rule::Source,
         };
         let base: Vec<f64> = (0..=40).map(f64::from).collect();
-        let mut bar = Adaptive::new(how, base.clone(), 3.0, |x| (-0.1 * (x - 10.0).powi(2)).exp());
+        let mut bar = Adaptive::<EngineBar>::new(how, base.clone(), 3.0, |x| (-0.1 * (x - 10.0).powi(2)).exp());
         bar.adapt();
         assert!(bar.grid.count() > 41 && bar.grid.at.contains(&10.5) && !bar.grid.at.contains(&30.5));
         bar.motion.u = bar.grid.at.iter().map(|x| (-0.1 * (x - 30.0).powi(2)).exp()).collect();

@@ -5,11 +5,11 @@
 //! horizon u = a far away, (24). On a grid of spacing h = δ/m the far displacement is a over the discrete modulus,
 //! 1 − 1/m² (triangular), 1 (constant), 1 + 1/(2m²) (inverted), because the sum Σ k ξ² is all that long waves see.
 
+use super::engine::EngineBar;
 use super::grid::{Grid, Layout};
 use super::micromodulus::Micromodulus;
-use super::model::{Bar, Rule};
+use super::model::{Bar, Model, Rule};
 use super::rate;
-use super::statics::{Translation, solve};
 use crate::{Measure, Outcome, Row, Study};
 use bondwise::error::Result;
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
@@ -34,16 +34,16 @@ pub struct Pulled {
 }
 
 impl Pulled {
-    pub fn new(half: f64, n: f64, m: f64, micromodulus: Micromodulus) -> Self {
+    pub fn new<M: Model>(half: f64, n: f64, m: f64, micromodulus: Micromodulus) -> Self {
         let grid = Grid::uniform(Layout::Vertex, -half, half, (2.0 * half * n).round() as usize);
         let horizon = m / n;
-        let bonds = Bar::uniform(grid.clone(), horizon, micromodulus, Rule::Source).bonds();
+        let model = M::new(&Bar::uniform(grid.clone(), horizon, micromodulus, Rule::Source));
         let mut load = vec![0.0; grid.count()];
         for side in [-1.0, 1.0] {
             let node = grid.nearest(side);
             load[node] = side / grid.volume(node);
         }
-        let u = solve(&bonds, &load, Translation::MeanZero);
+        let u = model.solve(&load);
         Self { grid, u, horizon, m }
     }
 
@@ -104,7 +104,7 @@ fn study(which: &[Micromodulus]) -> Result<Outcome> {
 /// V-S4-2b
 fn far_displacement(micromodulus: Micromodulus, outcome: &mut Outcome) {
     for (n, m) in [(10.0, 10.0), (20.0, 15.0), (30.0, 20.0), (40.0, 25.0)] {
-        let bar = Pulled::new(10.0, n, m, micromodulus);
+        let bar = Pulled::new::<EngineBar>(10.0, n, m, micromodulus);
         outcome.rows.push(Row::new(
             format!("u(5) − a (%), {}, L = 20, N = {}, m = {m}", micromodulus.name(), bar.grid.count()),
             100.0 / micromodulus.discrete_modulus(m) - 100.0,
@@ -123,7 +123,7 @@ fn at_fixed_horizon(which: &[Micromodulus], outcome: &mut Outcome) {
     let horizon = 0.4;
     let mut series = Vec::new();
     for &micromodulus in which {
-        let run = |m: f64| Pulled::new(HALF, m / horizon, m, micromodulus);
+        let run = |m: f64| Pulled::new::<EngineBar>(HALF, m / horizon, m, micromodulus);
         let finest = run(128.0);
         let errors: Vec<(f64, f64)> = [4.0, 8.0, 16.0, 32.0].map(|m| (m, run(m).inside(|x| finest.at(x)))).to_vec();
         let name = micromodulus.name();
@@ -150,7 +150,8 @@ fn at_fixed_ratio(which: &[Micromodulus], outcome: &mut Outcome) {
     for &micromodulus in which {
         let name = micromodulus.name();
         let modulus = micromodulus.discrete_modulus(m);
-        let runs: Vec<Pulled> = [5.0, 10.0, 20.0, 40.0, 80.0].map(|n| Pulled::new(HALF, n, m, micromodulus)).into();
+        let runs: Vec<Pulled> =
+            [5.0, 10.0, 20.0, 40.0, 80.0].map(|n| Pulled::new::<EngineBar>(HALF, n, m, micromodulus)).into();
         let finest = &runs[runs.len() - 1];
         outcome.rows.push(Row::new(
             format!("δ-convergence at m = 4, {name}: relative error inside at δ = {}", finest.horizon),
@@ -180,7 +181,7 @@ fn both(which: &[Micromodulus], outcome: &mut Outcome) {
     let mut series = Vec::new();
     for &micromodulus in which {
         let name = micromodulus.name();
-        let runs = path.map(|(m, n)| Pulled::new(HALF, n, m, micromodulus));
+        let runs = path.map(|(m, n)| Pulled::new::<EngineBar>(HALF, n, m, micromodulus));
         let errors: Vec<_> = runs.iter().map(|r| (r.horizon, r.inside(|x| x))).collect();
         let far = runs.iter().map(|r| (r.m, r.far().abs())).collect::<Vec<_>>();
         if micromodulus != Micromodulus::Constant {
@@ -217,7 +218,7 @@ fn both(which: &[Micromodulus], outcome: &mut Outcome) {
 fn jumps(outcome: &mut Outcome) {
     let horizon = 0.4;
     for m in [16.0, 32.0, 64.0] {
-        let bar = Pulled::new(HALF, m / horizon, m, Micromodulus::Inverted);
+        let bar = Pulled::new::<EngineBar>(HALF, m / horizon, m, Micromodulus::Inverted);
         let origin = "the paper's analysis of jumps; on the grid they are seen through cells of finite size, O(1/m²)";
         let tolerance = 1.0 / (m * m);
         let row = |what: &str, expected, obtained| {

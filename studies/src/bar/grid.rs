@@ -59,6 +59,16 @@ impl Grid {
         self.high[i] - self.low[i]
     }
 
+    /// Σ V f
+    pub fn sum(&self, values: &[f64]) -> f64 {
+        values.iter().enumerate().map(|(i, value)| self.volume(i) * value).sum()
+    }
+
+    /// Σ V u/Σ V
+    pub fn mean(&self, values: &[f64]) -> f64 {
+        self.sum(values) / (self.high[self.count() - 1] - self.low[0])
+    }
+
     /// The node next to x.
     pub fn nearest(&self, x: f64) -> usize {
         let after = self.at.partition_point(|&at| at < x).clamp(1, self.count() - 1);
@@ -70,10 +80,5 @@ impl Grid {
         let after = self.at.partition_point(|&at| at < x).clamp(1, self.count() - 1);
         let share = (x - self.at[after - 1]) / (self.at[after] - self.at[after - 1]);
         values[after - 1] + share * (values[after] - values[after - 1])
-    }
-
-    /// The part of cell p within the distance d of the node i.
-    pub fn covered(&self, p: usize, i: usize, d: f64) -> f64 {
-        (self.high[p].min(self.at[i] + d) - self.low[p].max(self.at[i] - d)).max(0.0)
     }
 }

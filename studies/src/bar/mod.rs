@@ -1,24 +1,27 @@
 //! One-dimensional peridynamics by itself: convergence, refinement and scaling as in Bobaru, Yang, Alves, Silling,
 //! Askari & Xu 2009, Int. J. Numer. Meth. Engng 77, 852-877.
 //!
-//! A plain model, independent of the engine and written to be read: nodes with cells of any size, a horizon at each,
-//! equation (25) as it stands. E = A = ρ = 1 as in the paper; lengths and times have no unit.
+//! Nodes with cells of any size and a horizon at each; E = A = ρ = 1 as in the paper, lengths and times have no unit.
 //!
-//! [`grid`] and [`micromodulus`], then [`model`]; [`statics`], [`dynamics`] and [`adaptive`] solve it. The studies:
-//! `seven_nodes`, `convergence`, `placement` (Tables I, II), `pulse` (Tables III, IV), `following` (Table V).
+//! `grid`, `micromodulus` and `model` say what a bar is, `engine` computes it with the engine, `adaptive` and
+//! `relaxation` are methods of the paper. The studies: `seven_nodes`, `convergence`, `placement` (Tables I, II), `pulse`
+//! (Tables III, IV), `following` (Table V). In tests, `oracle` computes the same bars and studies by a plain model of its
+//! own, and the figures are compared.
 
-pub mod adaptive;
+mod adaptive;
 mod convergence;
-pub mod dynamics;
+mod engine;
 mod following;
-pub mod grid;
-pub mod micromodulus;
-pub mod model;
+mod grid;
+mod micromodulus;
+mod model;
+#[cfg(test)]
+mod oracle;
 mod placement;
 mod pulse;
+mod relaxation;
 mod seven_nodes;
 mod singular_values;
-pub mod statics;
 
 pub use micromodulus::Micromodulus;
 

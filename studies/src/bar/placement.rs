@@ -15,10 +15,10 @@
 //! about 1 and 2 on the non-uniform grids of the paper.
 
 use super::convergence::Pulled;
+use super::engine::EngineBar;
 use super::grid::{Grid, Layout};
 use super::micromodulus::Micromodulus;
-use super::model::{Bar, Cover, Rule};
-use super::statics::{Translation, solve};
+use super::model::{Bar, Cover, Model, Rule};
 use super::{published, rate};
 use crate::{Measure, Outcome, Row, Study};
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
@@ -27,14 +27,14 @@ pub const TABLE_1: Study = Study {
     name: "table-1",
     about: "four places for the refined zone of a bar pulled by two forces, two micromoduli: errors and rates",
     heavy: false,
-    run: |_| Ok(table_1()),
+    run: |_| Ok(table_1::<EngineBar>()),
 };
 
 pub const TABLE_2: Study = Study {
     name: "table-2",
     about: "a long bar pulled by two forces: uniform, doubly and fourfold refined",
     heavy: false,
-    run: |_| Ok(table_2()),
+    run: |_| Ok(table_2::<EngineBar>()),
 };
 
 /// Total nodes and m.
@@ -86,7 +86,7 @@ impl Zones {
     }
 
     /// The error of the displacement at the probe, percent of the classical one, equation (23).
-    fn error(&self, n: f64, m: f64, mismatch: f64, micromodulus: Micromodulus, cover: Cover) -> f64 {
+    fn error<M: Model>(&self, n: f64, m: f64, mismatch: f64, micromodulus: Micromodulus, cover: Cover) -> f64 {
         // From the left end to the right one: the right half and its mirror image.
         let mirror = self.right.windows(2).rev().map(|z| (-z[0].0, z[1].1));
         let middle = (self.right[0].0, self.right[0].1);
@@ -103,13 +103,14 @@ impl Zones {
         let grid = Grid::zones(Layout::Centred, -self.half, &cells);
         let of = |x: f64| ratios.iter().find(|(end, _)| x < *end).map_or(0.0, |(_, horizon)| *horizon);
         let horizon = grid.at.iter().map(|&x| of(x)).collect();
-        let bonds = Bar { grid: grid.clone(), horizon, micromodulus, rule: Rule::Source, cover }.bonds();
+        let bar = Bar { grid, horizon, micromodulus, rule: Rule::Source, cover };
+        let grid = &bar.grid;
         let mut load = vec![0.0; grid.count()];
         let node = grid.nearest(1.0);
         for (node, force) in [(node, 1.0), (grid.count() - 1 - node, -1.0)] {
             load[node] = force / grid.volume(node);
         }
-        let u = solve(&bonds, &load, Translation::MeanZero);
+        let u = M::new(&bar).solve(&load);
         100.0 * (grid.interpolate(&u, self.probe) / self.probe - 1.0).abs()
     }
 }
@@ -126,13 +127,13 @@ const PLACED: [(char, Micromodulus, [f64; 4], f64); 8] = [
     ('d', Micromodulus::Triangular, [0.562, 0.126, 0.079, 0.040], 1.860),
 ];
 
-fn table_1() -> Outcome {
+pub(super) fn table_1<M: Model>() -> Outcome {
     let mut outcome = Outcome::default();
     let mut series: [Vec<Series>; 2] = Default::default();
     for (case, micromodulus, printed, printed_rate) in PLACED {
         let zones = Zones::placed(case);
         let name = micromodulus.name();
-        let errors = SIZES.map(|(n, m)| (n, zones.error(n, m, MISMATCH, micromodulus, Cover::Whole)));
+        let errors = SIZES.map(|(n, m)| (n, zones.error::<M>(n, m, MISMATCH, micromodulus, Cover::Whole)));
         for ((n, error), printed) in errors.into_iter().zip(printed) {
             let what = format!("error at x = {} (%), ({case}) {name}, N = {n}", zones.probe);
             outcome.rows.push(published(
@@ -159,11 +160,11 @@ fn table_1() -> Outcome {
         }
     }
     for micromodulus in KINDS {
-        let b = |mismatch, cover| move |n, m| Zones::placed('b').error(n, m, mismatch, micromodulus, cover);
+        let b = |mismatch, cover| move |n, m| Zones::placed('b').error::<M>(n, m, mismatch, micromodulus, cover);
         judge_rates(micromodulus, b(MISMATCH, Cover::Whole), b(MISMATCH, Cover::Exact), &mut outcome);
         let [seen, unseen] = ['a', 'b'].map(|case| {
             let (n, m) = SIZES[0];
-            Zones::placed(case).error(n, m, MISMATCH, micromodulus, Cover::Exact)
+            Zones::placed(case).error::<M>(n, m, MISMATCH, micromodulus, Cover::Exact)
         });
         outcome.rows.push(Row::new(
             format!("error (%) where coarse nodes see the loads (a), N = 201, {}", micromodulus.name()),
@@ -174,7 +175,7 @@ fn table_1() -> Outcome {
             "section 5.1, visibility criterion: not below that of (b), where they do not; exact parts of cells",
         ));
     }
-    rules(&mut outcome);
+    rules::<M>(&mut outcome);
     for (micromodulus, series) in KINDS.into_iter().zip(series) {
         plot("Table I", micromodulus, series, &mut outcome);
     }
@@ -194,24 +195,24 @@ fn table_1() -> Outcome {
 }
 
 /// Momentum and patch test of the three rules where horizon and spacing change 2:1.
-fn rules(outcome: &mut Outcome) {
+fn rules<M: Model>(outcome: &mut Outcome) {
     let grid = Grid::zones(Layout::Centred, -2.0, &[(0.0, 40), (2.0, 80)]);
     let horizon: Vec<f64> = grid.at.iter().map(|&x| if x < 0.0 { 0.25 } else { 0.125 }).collect();
     let at = grid.at.clone();
     let wave: Vec<f64> = at.iter().map(|x| (3.0 * x).sin()).collect();
     for micromodulus in KINDS {
         for rule in Rule::ALL {
-            let (grid, horizon) = (grid.clone(), horizon.clone());
-            let bonds = Bar { grid, horizon, micromodulus, rule, cover: Cover::Exact }.bonds();
-            let total = bonds.total_force(&wave);
+            let bar = Bar { grid: grid.clone(), horizon: horizon.clone(), micromodulus, rule, cover: Cover::Exact };
+            let (mut model, mut force) = (M::new(&bar), vec![0.0; at.len()]);
+            model.force(&wave, &mut force);
+            let total = grid.sum(&force);
             let label = format!("2:1, {rule:?} rule, {}", micromodulus.name());
             let what = format!("total inner force of u = sin 3x, {label}");
             outcome.rows.push(match rule {
                 Rule::Source => published(what, 0.0, total, "(38) to (41) argue that it is 0; c(r; δ_i) ≠ c(r; δ_p)"),
                 _ => Row::new(what, 0.0, total, 1e-10, Measure::Absolute, "action is reaction; round-off of 120 sums"),
             });
-            let mut force = vec![0.0; bonds.count()];
-            bonds.force(&at, &mut force);
+            model.force(&at, &mut force);
             let inside = force.iter().zip(&at).filter(|(_, x)| x.abs() < 1.0);
             let residual = inside.fold(0.0, |most: f64, (f, _)| most.max(f.abs()));
             let what = format!("largest force density of u = x inside, {label}");
@@ -275,7 +276,7 @@ fn uniform_expected(micromodulus: Micromodulus) -> [f64; 4] {
     }
 }
 
-fn table_2() -> Outcome {
+pub(super) fn table_2<M: Model>() -> Outcome {
     let mut outcome = Outcome::default();
     let not_judged = "Table II; not judged, zone limits and measure of the error are not published";
     for (micromodulus, [printed, double, quadruple]) in REFINED {
@@ -285,7 +286,7 @@ fn table_2() -> Outcome {
             .iter()
             .zip(SIZES)
             .map(|(&m, (n, _))| {
-                let bar = Pulled::new(10.0, (n - 1.0) / 20.0, m, micromodulus);
+                let bar = Pulled::new::<M>(10.0, (n - 1.0) / 20.0, m, micromodulus);
                 (n, 100.0 * (bar.at(0.5) / 0.5 - 1.0).abs())
             })
             .collect();
@@ -305,7 +306,7 @@ fn table_2() -> Outcome {
         let published_points = SIZES.iter().map(|s| s.0).zip(printed).collect();
         series.push(Series { name: "uniform, published".into(), points: published_points, style: Style::Dashed });
         for (factor, printed) in [(2.0, double), (4.0, quadruple)] {
-            let of = |cover| move |n, m| Zones::long(factor, n, m).error(n, m, MISMATCH, micromodulus, cover);
+            let of = |cover| move |n, m| Zones::long(factor, n, m).error::<M>(n, m, MISMATCH, micromodulus, cover);
             let (whole, exact) = (of(Cover::Whole), of(Cover::Exact));
             for ((n, m), (printed, &(_, even))) in SIZES.into_iter().zip(printed.into_iter().zip(&ours)) {
                 let label = format!("{factor}-fold {name}, N = {n}");

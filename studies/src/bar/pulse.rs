@@ -4,10 +4,12 @@
 //! that a pulse of half the height, 0.01, runs to the right with the speed 1. Runge-Kutta, Δt = 0.15, vertex nodes with
 //! half cells at the ends, exact parts of cells.
 
-use super::dynamics::{Motion, RungeKutta};
+use rayon::prelude::*;
+
+use super::engine::EngineBar;
 use super::grid::{Grid, Layout};
 use super::micromodulus::Micromodulus;
-use super::model::{Bar, Rule};
+use super::model::{Bar, Model, Motion, Rule};
 use super::{published, rate};
 use crate::{Measure, Outcome, Row, Study};
 use bondwise::error::Result;
@@ -17,14 +19,14 @@ pub const TABLE_3: Study = Study {
     name: "table-3",
     about: "a pulse reflected where the spacing of a 1D bar changes and its horizon does not",
     heavy: false,
-    run: |_| table_3(),
+    run: |_| Ok(table_3::<EngineBar>()),
 };
 
 pub const TABLE_4: Study = Study {
     name: "table-4",
     about: "arrival and height of a pulse on uniform 1D grids, to the printed digits",
     heavy: false,
-    run: |_| table_4_with_influence(false, Micromodulus::Triangular),
+    run: |_| Ok(table_4::<EngineBar>(Micromodulus::Triangular)),
 };
 
 pub(super) const STEP: f64 = 0.15;
@@ -50,23 +52,22 @@ impl Record {
     }
 }
 
-fn march(bar: &Bar, probe: f64, until: f64) -> Record {
-    let (bonds, node) = (bar.bonds(), bar.grid.nearest(probe));
+fn march<M: Model>(bar: &Bar, probe: f64, until: f64) -> Record {
+    let (mut model, node) = (M::new(bar), bar.grid.nearest(probe));
     let mut motion = Motion::released(bar.grid.at.iter().map(|&x| half_gaussian(x)).collect());
-    let mut method = RungeKutta::new(STEP);
     let mut record = Record::default();
     for step in 1..=(until / STEP) as u32 {
-        method.step(&bonds, &mut motion);
+        model.step(&mut motion, STEP);
         record.signal.push((f64::from(step) * STEP, motion.u[node]));
     }
     record
 }
 
 /// Arrival and height at x = 400 on a uniform grid of the bar of length 450.
-pub(super) fn uniform(intervals: usize, horizon: f64, micromodulus: Micromodulus) -> (f64, f64) {
+pub(super) fn uniform<M: Model>(intervals: usize, horizon: f64, micromodulus: Micromodulus) -> (f64, f64) {
     let grid = Grid::uniform(Layout::Vertex, 0.0, 450.0, intervals);
     let bar = Bar::uniform(grid, horizon, micromodulus, Rule::Source);
-    march(&bar, 400.0, 440.0).peak(0.0, 440.0)
+    march::<M>(&bar, 400.0, 440.0).peak(0.0, 440.0)
 }
 
 /// Nodes, horizon; published arrival and height.
@@ -79,11 +80,16 @@ const UNIFORM: [(usize, f64, f64, f64); 5] = [
 ];
 
 pub fn table_4_with_influence(_full: bool, micromodulus: Micromodulus) -> Result<Outcome> {
+    Ok(table_4::<EngineBar>(micromodulus))
+}
+
+pub(super) fn table_4<M: Model>(micromodulus: Micromodulus) -> Outcome {
     let mut outcome = Outcome::default();
     let (mut times, mut heights, mut foreseen) = (Vec::new(), Vec::new(), Vec::new());
     let judged = micromodulus == Micromodulus::Triangular;
-    for (n, horizon, arrival, height) in UNIFORM {
-        let (t, u) = uniform(n - 1, horizon, micromodulus);
+    let found: Vec<(f64, f64)> =
+        UNIFORM.par_iter().map(|(n, horizon, ..)| uniform::<M>(n - 1, *horizon, micromodulus)).collect();
+    for ((n, horizon, arrival, height), (t, u)) in UNIFORM.into_iter().zip(found) {
         let label = format!("N = {n}, δ = {horizon}");
         let measure = if judged { Measure::Absolute } else { Measure::Information };
         outcome.rows.extend([
@@ -146,7 +152,7 @@ pub fn table_4_with_influence(_full: bool, micromodulus: Micromodulus) -> Result
         ..Plot::default()
     };
     outcome.plots.push(("errors".into(), draw_plot(&plot, 900, 640)));
-    Ok(outcome)
+    outcome
 }
 
 /// Micromodulus, refinement of the middle third; published arrival and height of the reflection.
@@ -157,14 +163,19 @@ const REFLECTIONS: [(&str, Micromodulus, usize, f64, f64); 4] = [
     ("b", Micromodulus::Triangular, 4, 252.30, 1.4945e-4),
 ];
 
-fn table_3() -> Result<Outcome> {
+pub(super) fn table_3<M: Model>() -> Outcome {
     let mut outcome = Outcome::default();
     let mut series = Vec::new();
-    for (case, micromodulus, factor, arrival, height) in REFLECTIONS {
-        let grid = Grid::zones(Layout::Vertex, 0.0, &[(100.0, 500), (200.0, 500 * factor), (300.0, 500)]);
-        let bar = Bar::uniform(grid, 0.5, micromodulus, Rule::Source);
-        // The pulse passes at 150 and reaches the far end at 300; between them only what is reflected comes by.
-        let record = march(&bar, 150.0, 270.0);
+    let records: Vec<Record> = REFLECTIONS
+        .par_iter()
+        .map(|(_, micromodulus, factor, ..)| {
+            let grid = Grid::zones(Layout::Vertex, 0.0, &[(100.0, 500), (200.0, 500 * factor), (300.0, 500)]);
+            let bar = Bar::uniform(grid, 0.5, *micromodulus, Rule::Source);
+            // The pulse passes at 150 and reaches the far end at 300; between them only what is reflected comes by.
+            march::<M>(&bar, 150.0, 270.0)
+        })
+        .collect();
+    for ((case, micromodulus, _, arrival, height), record) in REFLECTIONS.into_iter().zip(records) {
         let (t, u) = record.peak(225.0, 268.0);
         let label = format!("({case}) {}", micromodulus.name());
         outcome.rows.extend([
@@ -205,5 +216,5 @@ fn table_3() -> Result<Outcome> {
         ..Plot::default()
     };
     outcome.plots.push(("reflection".into(), draw_plot(&plot, 1000, 640)));
-    Ok(outcome)
+    outcome
 }

@@ -1,11 +1,12 @@
 //! `bar-7-nodes`: the system of seven nodes that the paper prints, and how it is conditioned.
 
+use super::engine::EngineBar;
 use super::grid::{Grid, Layout};
 use super::micromodulus::Micromodulus;
-use super::model::{Bar, Bonds, Rule};
+use super::model::{Bar, Model, Rule};
 use super::published;
+use super::relaxation::{Damping, relax};
 use super::singular_values::singular_values;
-use super::statics::{Damping, Translation, relax, solve};
 use crate::{Measure, Outcome, Row, Study};
 use bondwise::error::Result;
 
@@ -36,13 +37,13 @@ fn expected(micromodulus: Micromodulus) -> [f64; 3] {
     }
 }
 
-fn bonds(micromodulus: Micromodulus) -> Bonds {
-    Bar::uniform(Grid::uniform(Layout::Vertex, 0.0, 6.0, 6), 2.0, micromodulus, Rule::Source).bonds()
+fn bar(micromodulus: Micromodulus) -> Bar {
+    Bar::uniform(Grid::uniform(Layout::Vertex, 0.0, 6.0, 6), 2.0, micromodulus, Rule::Source)
 }
 
 fn run(_full: bool) -> Result<Outcome> {
     let mut outcome = Outcome::default();
-    let matrix = doubled(&bonds(Micromodulus::Constant));
+    let matrix = doubled(Micromodulus::Constant);
     let off = (0..49).map(|k| (matrix[k / 7][k % 7] - PRINTED[k / 7][k % 7]).abs()).fold(0.0, f64::max);
     outcome.rows.push(Row::new(
         "largest difference of an entry from the printed matrix",
@@ -72,18 +73,19 @@ fn run(_full: bool) -> Result<Outcome> {
 
 const CONDITION: &str = "section 2.3; obtained: σ₁/σ₇ of the singular matrix as computed, round-off only (1e300 for 0)";
 
-fn doubled(bonds: &Bonds) -> Vec<Vec<f64>> {
-    bonds.matrix().iter().map(|row| row.iter().map(|a| 2.0 * a).collect()).collect()
+fn doubled(micromodulus: Micromodulus) -> Vec<Vec<f64>> {
+    let matrix = EngineBar::new(&bar(micromodulus)).matrix();
+    matrix.iter().map(|row| row.iter().map(|a| 2.0 * a).collect()).collect()
 }
 
 fn condition(micromodulus: Micromodulus) -> f64 {
-    let values = singular_values(&bonds(micromodulus).matrix());
+    let values = singular_values(&EngineBar::new(&bar(micromodulus)).matrix());
     values[0] / values[6].max(1e-300 * values[0])
 }
 
 fn conditioning(micromodulus: Micromodulus, outcome: &mut Outcome) {
     let name = micromodulus.name();
-    let matrix = doubled(&bonds(micromodulus));
+    let matrix = doubled(micromodulus);
     let values = singular_values(&matrix);
     let rank = values.iter().filter(|&&v| v > 1e-12 * values[0]).count();
     let of_ones = matrix.iter().map(|row| row.iter().sum::<f64>().abs()).fold(0.0, f64::max);
@@ -118,13 +120,12 @@ fn conditioning(micromodulus: Micromodulus, outcome: &mut Outcome) {
 fn relaxation(outcome: &mut Outcome) {
     let load = [0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.0];
     for micromodulus in Micromodulus::ALL {
-        let bonds = bonds(micromodulus);
-        let mut pinned = solve(&bonds, &load, Translation::Pinned(3));
-        let mean = pinned.iter().zip(&bonds.volume).map(|(u, v)| u * v).sum::<f64>() / 6.0;
-        pinned.iter_mut().for_each(|u| *u -= mean);
+        let bar = bar(micromodulus);
+        let solved = EngineBar::new(&bar).solve(&load);
         for damping in [Damping::Kinetic, Damping::Rayleigh] {
-            let (difference, steps) = relax(&bonds, &load, damping, 1e-10, 10_000).map_or((f64::NAN, 0), |(u, n)| {
-                (u.iter().zip(&pinned).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max), n)
+            let relaxed = relax::<EngineBar>(&bar, &load, damping, 1e-10, 10_000);
+            let (difference, steps) = relaxed.map_or((f64::NAN, 0), |(u, n)| {
+                (u.iter().zip(&solved).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max), n)
             });
             outcome.rows.push(Row::new(
                 format!("relaxed less direct displacement, {}, {damping:?} ({steps} steps)", micromodulus.name()),
