@@ -5,8 +5,6 @@
 //! Tolerances as in `patch.rs`: K = λ/2 stands for the spring constant of all bonds of a point, with λ the bound behind
 //! the stable step.
 
-mod common;
-
 use bondwise::case::build::{Options, build};
 use bondwise::case::model::Case;
 use bondwise::case::read_text;
@@ -21,7 +19,7 @@ use bondwise::physics::elasticity::{Bonds, State};
 use bondwise::physics::failure::CriticalStretch;
 use bondwise::simulation::Simulation;
 use bondwise_studies::discrete::discrete_moduli;
-use common::Held;
+use crate::common::Held;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 

@@ -2,8 +2,6 @@
 //! that the largest stretch so far has left them. Nothing in the library is of this law; it is what a law with memory and
 //! with cases needs: compare, select, remember.
 
-mod common;
-
 use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
 use bondwise::execution::{Exec, Instructions, Packs};
 use bondwise::family::{Body, Bond, BondLaw};

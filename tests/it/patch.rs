@@ -5,8 +5,6 @@
 //! error ε of displacements changes no force density by more than 2 K ε, and displacements u of a body of size X are
 //! known to ε = 2⁻⁵³ (|u| + X |∇u|), the second part because positions are rounded too.
 
-mod common;
-
 use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
 use bondwise::family::{Body, Bond, BondLaw, Families};
 use bondwise::field::{components, components_mut};
@@ -15,7 +13,7 @@ use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
 use bondwise::physics::elasticity::moduli::{Hypothesis, micromodulus};
 use bondwise::physics::elasticity::{Bonds, State};
 use bondwise_studies::discrete::discrete_moduli;
-use common::Held;
+use crate::common::Held;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 

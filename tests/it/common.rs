@@ -1,5 +1,4 @@
 //! What several tests share.
-#![allow(dead_code)] // each test uses its part
 
 use std::sync::Mutex;
 
@@ -51,9 +50,5 @@ impl<const D: usize, P: Packs> Held<D, P> {
 
     pub fn stable_step(&self) -> f64 {
         self.0.lock().unwrap().stable_step()
-    }
-
-    pub fn is_linear(&self) -> bool {
-        self.0.lock().unwrap().material.is_linear()
     }
 }

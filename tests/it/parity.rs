@@ -1,8 +1,6 @@
 //! The same numbers whichever way they are computed: on a lattice or on the same points as a scattered cloud, on any
 //! number of threads.
 
-mod common;
-
 use std::ops::Range;
 
 use bondwise::case::build::{Options, build};
@@ -18,7 +16,7 @@ use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
 use bondwise::physics::elasticity::{Bonds, State};
 use bondwise::physics::failure::CriticalStretch;
 use bondwise::simulation::Simulation;
-use common::Held;
+use crate::common::Held;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 

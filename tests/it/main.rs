@@ -1,0 +1,17 @@
+//! The tests of the library from outside: one program, so that what they are generic over is compiled once.
+
+mod architecture;
+mod common;
+mod diffusion;
+mod engine;
+mod hybrid;
+mod memory;
+mod parity;
+mod patch;
+mod refinement;
+mod regressions;
+mod setup;
+mod solvers;
+mod state;
+mod state_based;
+mod statics;
