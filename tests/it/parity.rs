@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use crate::common::Held;
 use bondwise::case::build::{Options, build};
 use bondwise::case::model::Case;
 use bondwise::case::read_text;
@@ -16,7 +17,6 @@ use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
 use bondwise::physics::elasticity::{Bonds, State};
 use bondwise::physics::failure::CriticalStretch;
 use bondwise::simulation::Simulation;
-use crate::common::Held;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 

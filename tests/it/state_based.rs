@@ -5,12 +5,14 @@
 //! Tolerances as in `patch.rs`: K = λ/2 stands for the spring constant of all bonds of a point, with λ the bound behind
 //! the stable step.
 
+use crate::common::Held;
 use bondwise::case::build::{Options, build};
 use bondwise::case::model::Case;
 use bondwise::case::read_text;
 use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
+use bondwise::execution::Packs;
 use bondwise::family::{Body, Families};
-use bondwise::field::{Values, components, components_mut};
+use bondwise::field::{Mixed, Number, Single, Values, components, components_mut};
 use bondwise::geometry::{Arrangement, Cloud, Shape};
 use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
 use bondwise::physics::elasticity::linear_solid::{LinearSolid, Moduli, Stretch};
@@ -19,7 +21,6 @@ use bondwise::physics::elasticity::{Bonds, State};
 use bondwise::physics::failure::CriticalStretch;
 use bondwise::simulation::Simulation;
 use bondwise_studies::discrete::discrete_moduli;
-use crate::common::Held;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -796,5 +797,57 @@ fn a_plate_at_rest_is_longer_by_young_and_narrower_by_poisson() {
         // Families of m = 4 are off by some 1 %, and the plate is stiffer near its edges, two fifths of it.
         assert!((along / 1e-4 - 1.0).abs() < 0.08, "{law}: {along:e}");
         assert!((across / along + 0.2).abs() < 0.01, "{law}: {}", across / along);
+    }
+}
+
+/// Largest differences of forces and energy densities to those in double precision, over the largest of each.
+fn rounded<const D: usize, P: Packs>(cloud: &Cloud<D>, poisson: f64, ratio: f64) -> [f64; 2] {
+    let s = Specimen::new(cloud.clone(), BondBased, poisson, Influence::Linear, PartialVolume::Ramp, ratio);
+    let mut random = Random::new(12);
+    let state = s.displaced(|_, x| {
+        let noise: [f64; D] = random.vector(1e-4 * SPACING);
+        std::array::from_fn(|d| 1e-3 * x[d] + noise[d])
+    });
+    let operator = Operator::standard(&s.body, s.moduli.strength(&s.influence, s.body.horizon), s.influence, s.rule);
+    let solid = LinearSolid::new(BondBased, s.moduli, &s.body, &operator.weights);
+    let held = Held::<D, P>::new(&s.body, operator, Box::new(solid), DENSITY, None);
+    let mut other = held.initial_state();
+    for (u, exact) in other.displacement.iter_mut().zip(&state.displacement) {
+        *u = P::Field::from_f64(*exact);
+    }
+    held.evolve(&mut other, 0.0);
+    let (w, exact_w) = (held.energy_density(&other), s.energy_density(&state));
+    let worst = |pairs: &mut dyn Iterator<Item = (f64, f64)>| {
+        let (mut off, mut size) = (0.0f64, 0.0f64);
+        pairs.for_each(|(a, b)| (off, size) = (off.max((a - b).abs()), size.max(b.abs())));
+        off / size
+    };
+    let forces = worst(&mut other.force.iter().zip(&state.force).map(|(a, b)| (a.to_f64(), *b)));
+    [forces, worst(&mut w.iter().zip(&exact_w).map(|(a, b)| (a.to_f64(), *b)))]
+}
+
+#[test]
+fn single_and_mixed_precision_are_double_to_their_rounding() {
+    let (plate, scattered) = (lattice::<2>([21, 16, 0]), perturbed::<2>([21, 16, 0]));
+    let solid = lattice::<3>([11, 10, 9]);
+    for poisson in RATIOS {
+        // Displacements of 20 spacings times 1e-3 are known to 1e-9 spacings, stretches of 1e-3 to some 1e-6, and near
+        // incompressibility two parts are five times their difference. Forces of neighbours cancel: noise of a tenth of the
+        // strain is what is left of them.
+        for [force, energy] in [
+            rounded::<2, Single>(&plate, poisson, 3.0),
+            rounded::<2, Single>(&scattered, poisson, 3.0),
+            rounded::<3, Single>(&solid, poisson, 2.0),
+        ] {
+            assert!(force < 3e-4 && energy < 1e-4, "{poisson}: {force:e} {energy:e}");
+        }
+        // Displacements are subtracted in double precision: what is left is the arithmetic along a bond.
+        for [force, energy] in [
+            rounded::<2, Mixed>(&plate, poisson, 3.0),
+            rounded::<2, Mixed>(&scattered, poisson, 3.0),
+            rounded::<3, Mixed>(&solid, poisson, 2.0),
+        ] {
+            assert!(force < 3e-5 && energy < 1e-5, "{poisson}: {force:e} {energy:e}");
+        }
     }
 }
