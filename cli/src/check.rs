@@ -34,10 +34,10 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
             say!("Rayleigh speed    {speed:.1} m/s");
         }
         say!("stable step       {:.6e} s", facts.stable_step * simulation.solver.stability());
-        let steps = simulation.later.front().map_or(simulation.n_steps, |leg| leg.first);
+        let steps = simulation.stages_to_come.front().map_or(simulation.n_steps, |leg| leg.first);
         let end = steps as f64 * simulation.clock.dt;
         say!("steps             {steps} of {:.6e} s, to t = {end:.6e} s", simulation.clock.dt);
-        for leg in &simulation.later {
+        for leg in &simulation.stages_to_come {
             say!("then              {} of {:.6e} s, to t = {:.6e} s", leg.n_steps, leg.dt, leg.ends);
         }
         let mib = |bytes: u64| bytes as f64 / 1048576.0;

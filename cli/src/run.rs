@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use bondwise::Result;
 use bondwise::case::build::{Options, load};
 use bondwise::output::report::Report;
-use bondwise::simulation::{Wish, prepare_folder};
+use bondwise::simulation::{Control, prepare_folder};
 use bondwise::solver::statics::LoadStep;
 
 use crate::progress::Line;
@@ -57,7 +57,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
         let mut line = Line::new(args.quiet);
         let report = simulation.run(|progress| {
             line.show(progress);
-            if stop.load(Ordering::Relaxed) { Wish::Stop } else { Wish::Continue }
+            if stop.load(Ordering::Relaxed) { Control::Stop } else { Control::Continue }
         });
         line.finish();
         report

@@ -15,7 +15,7 @@ use super::diagnostics::{Diagnostic, Severity};
 use super::model::{self, Case, Motion, Output, PartialVolumes, Plane, Precision, Scheme, SurfaceCorrection};
 use super::read::{Located, Source};
 use crate::conditions::initial;
-use crate::discretization::{Correction, Influence, Operator, PartialVolume, Scaling, standard};
+use crate::discretization::{BondWeighting, Correction, Influence, Operator, PartialVolume, standard};
 use crate::error::{Error, Result};
 use crate::execution::{Exec, Packs};
 use crate::family::{Body, Update};
@@ -27,7 +27,7 @@ use crate::output::history::History;
 use crate::output::pictures::Pictures;
 use crate::output::probe::Probe;
 use crate::output::schedule::Schedule;
-use crate::output::source::Facts;
+use crate::output::source::BodySummary;
 use crate::output::writer::Output as Written;
 use crate::physics::Physics;
 use crate::physics::elasticity::laws::Law;
@@ -37,7 +37,7 @@ use crate::physics::elasticity::surface::{correction_by_energy, correction_by_vo
 use crate::physics::elasticity::{Elasticity, On};
 use crate::physics::failure::CriticalStretch;
 use crate::problem::Problem;
-use crate::simulation::{Leg, Model, Simulation, Stepper};
+use crate::simulation::{Model, Simulation, SolverStage, Stepper};
 use crate::solver::dynamic_relaxation::DynamicRelaxation;
 use crate::solver::linear_solver::{self, LinearSolver, Preconditioning};
 use crate::solver::newton::Newton;
@@ -146,7 +146,7 @@ impl<const D: usize> Builder<'_, D> {
             None => moduli::micromodulus(hypothesis, &influence, parameters.young, horizon),
         };
         let tolerance = 1e-9 * cloud.spacing;
-        let scaling = Scaling { strength, horizon, influence, rule };
+        let scaling = BondWeighting { strength, horizon, influence, rule };
         let adaptation = match &case.refinement {
             Some(refinement) => Some(self.adaptation(refinement, &cloud, shape.as_ref(), scaling, &cracks)?),
             None => None,
@@ -251,7 +251,7 @@ impl<const D: usize> Builder<'_, D> {
         }
         let stable_step = elasticity.stable_step().min(finest_step);
         let smallest = elasticity.failure.as_ref().map(CriticalStretch::smallest).filter(|s| s.is_finite());
-        let facts = Facts {
+        let facts = BodySummary {
             dimension: D,
             points: 0,
             bonds: 0,
@@ -278,7 +278,12 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// What corrects the surfaces of this body, if asked.
-    fn correction<P: Packs>(&self, body: &Body<D>, operator: &Operator, scaling: &Scaling) -> Option<Correction<D>> {
+    fn correction<P: Packs>(
+        &self,
+        body: &Body<D>,
+        operator: &Operator,
+        scaling: &BondWeighting,
+    ) -> Option<Correction<D>> {
         let mut on = On { body, operator, failure: None, exec: &mut Exec::default() };
         match self.case.value.discretization.surface_correction {
             SurfaceCorrection::None => None,
@@ -311,7 +316,7 @@ impl<const D: usize> Builder<'_, D> {
                 Output::Picture(picture) => {
                     // One that does not say when is drawn at the end only.
                     let schedule = match schedule(picture.every, picture.every_steps, &picture.at) {
-                        Schedule::Ends => Schedule::End,
+                        Schedule::LoadEnds => Schedule::End,
                         other => other,
                     };
                     self.files(&schedule, n_steps, dt, &format!("output[{k}].picture"))?;
@@ -347,7 +352,7 @@ impl<const D: usize> Builder<'_, D> {
             solver: first.solver,
             clock: Clock::new(first.dt),
             n_steps,
-            later: legs,
+            stages_to_come: legs,
             history: History::new(folder.join("history.csv"), every, tip),
             outputs,
             folder: folder.clone(),
@@ -357,7 +362,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// The solvers of the case, one after another.
-    fn legs(&self, stable_step: f64) -> Result<VecDeque<Leg>> {
+    fn legs(&self, stable_step: f64) -> Result<VecDeque<SolverStage>> {
         let (mut legs, mut step, mut time) = (VecDeque::new(), 0, 0.0);
         for (path, chosen) in self.case.value.solver.stages() {
             let newton = |s: &model::Statics| {
@@ -386,7 +391,7 @@ impl<const D: usize> Builder<'_, D> {
                 (_, steps) => (length / steps.unwrap_or(1) as f64, steps.unwrap_or(1)),
             };
             let ends = time + n_steps as f64 * dt;
-            legs.push_back(Leg { solver, dt, n_steps, first: step, ends });
+            legs.push_back(SolverStage { solver, dt, n_steps, first: step, ends });
             (step, time) = (step + n_steps, ends);
         }
         Ok(legs)

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Booked, Profile, Scale, Term, Volumes};
+use super::{Booked, FormulaAtPoints, Scale, Term, Volumes};
 use crate::field::Number;
 use crate::refinement::Remap;
 use crate::unknown::{Component, Unknown, with};
@@ -16,7 +16,7 @@ use crate::visit::Visitor;
 pub struct Load {
     pub slots: Arc<[u32]>,
     pub component: usize,
-    pub profile: Profile,
+    pub profile: FormulaAtPoints,
     /// Multiplies the profile: 1 for body forces, 1/ℓ for tractions, −n/ℓ by point for pressures.
     pub scale: Scale,
     /// Acts while t ≤ until, s.
@@ -31,7 +31,7 @@ pub struct Load {
 
 impl Load {
     /// Acts for ever, with `scale` 1.
-    pub fn new(slots: Arc<[u32]>, component: usize, profile: Profile) -> Self {
+    pub fn new(slots: Arc<[u32]>, component: usize, profile: FormulaAtPoints) -> Self {
         let (scale, volume) = (Scale::Same(1.0), Scale::Same(1.0));
         let (force, displacement) = (Vec::new(), Vec::new());
         Load { slots, component, profile, scale, until: f64::INFINITY, volume, force, displacement }

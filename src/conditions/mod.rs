@@ -10,7 +10,7 @@ pub mod profile;
 
 pub use load::Load;
 pub use prescribed::{Prescribed, Quantity};
-pub use profile::Profile;
+pub use profile::FormulaAtPoints;
 
 use crate::refinement::Remap;
 use crate::unknown::Unknown;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Booked, Constraint, Instant, Profile, Scale, Stage, Volumes};
+use super::{Booked, Constraint, FormulaAtPoints, Instant, Scale, Stage, Volumes};
 use crate::field::Number;
 use crate::refinement::Remap;
 use crate::unknown::{Component, Unknown, with};
@@ -25,7 +25,7 @@ pub struct Prescribed {
     pub slots: Arc<[u32]>,
     pub component: usize,
     pub quantity: Quantity,
-    pub profile: Profile,
+    pub profile: FormulaAtPoints,
     /// Holds while t ≤ until, s.
     pub until: f64,
     /// Force that the constraint exerts on the body, mean over the last step, N.
@@ -46,7 +46,13 @@ const SLACK: f64 = 1e-9;
 
 impl Prescribed {
     /// Holds for ever.
-    pub fn new(name: String, slots: Arc<[u32]>, component: usize, quantity: Quantity, profile: Profile) -> Self {
+    pub fn new(
+        name: String,
+        slots: Arc<[u32]>,
+        component: usize,
+        quantity: Quantity,
+        profile: FormulaAtPoints,
+    ) -> Self {
         Prescribed {
             name,
             slots,

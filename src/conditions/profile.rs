@@ -11,7 +11,7 @@ pub const VARIABLES: [&str; 4] = ["x", "y", "z", "t"];
 
 /// A formula in x, y, z, t, evaluated at the points of a set; again only when the time matters.
 #[derive(Debug, Clone)]
-pub struct Profile {
+pub struct FormulaAtPoints {
     expression: Expression,
     columns: [Vec<f64>; 3],
     values: Vec<f64>,
@@ -19,7 +19,7 @@ pub struct Profile {
     ready: bool,
 }
 
-impl Profile {
+impl FormulaAtPoints {
     pub fn new<const D: usize>(expression: Expression, cloud: &Cloud<D>, slots: &Arc<[u32]>) -> Self {
         let columns = std::array::from_fn(|axis| {
             if !expression.uses(VARIABLES[axis]) {
@@ -27,12 +27,12 @@ impl Profile {
             }
             slots.iter().map(|&slot| embed(&cloud.position(slot as usize))[axis]).collect()
         });
-        Profile::with(expression, columns, slots)
+        FormulaAtPoints::with(expression, columns, slots)
     }
 
     fn with(expression: Expression, columns: [Vec<f64>; 3], slots: &Arc<[u32]>) -> Self {
         let moves = expression.uses("t");
-        Profile { expression, columns, values: vec![0.0; slots.len()], moves, ready: false }
+        FormulaAtPoints { expression, columns, values: vec![0.0; slots.len()], moves, ready: false }
     }
 
     /// The same formula at the points of another set. `positions` by slot, m.
@@ -43,7 +43,7 @@ impl Profile {
             }
             slots.iter().map(|&slot| positions[slot as usize][axis]).collect()
         });
-        Profile::with(self.expression.clone(), columns, slots)
+        FormulaAtPoints::with(self.expression.clone(), columns, slots)
     }
 
     /// The values at time `t`, in the order of the set.

@@ -28,7 +28,7 @@ use crate::geometry::Cloud;
 
 /// How bonds are weighted on a body whose horizons differ.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scaling {
+pub struct BondWeighting {
     /// c₀, the micromodulus constant at the horizon δ₀ (m).
     pub strength: f64,
     pub horizon: f64,
@@ -52,7 +52,7 @@ impl Grading {
     }
 }
 
-impl Scaling {
+impl BondWeighting {
     /// A body with these horizons.
     pub fn body<const D: usize>(&self, cloud: Cloud<D>, grading: Grading) -> Body<D> {
         let (reach, ends) = (self.reach::<D>(&grading), grading.clone());
@@ -184,7 +184,8 @@ mod tests {
 
     #[test]
     fn the_part_of_a_cell_within_the_horizon_counts_wherever_its_point_is() {
-        let scaling = Scaling { strength: 1.0, horizon: 3.0, influence: Influence::Linear, rule: PartialVolume::Exact };
+        let scaling =
+            BondWeighting { strength: 1.0, horizon: 3.0, influence: Influence::Linear, rule: PartialVolume::Exact };
         let here = End { size: 1.0, horizon: 3.0, shift: [0.1, -0.2, 0.0] };
         let there = End { size: 0.7, horizon: 2.4, shift: [-0.3, 0.15, 0.0] };
         let xi = [2.5, 1.2];
@@ -196,7 +197,7 @@ mod tests {
             assert_eq!(scaling.bond(rule, here, there, &xi), back, "{rule:?}: both ends see the same bits");
         }
         // Whole or not at all: the point decides.
-        let whole = Scaling { rule: PartialVolume::None, ..scaling };
+        let whole = BondWeighting { rule: PartialVolume::None, ..scaling };
         assert_eq!(whole.bond(Rule::Source, here, there, &[2.9, 0.0])[0], 1.0);
         assert_eq!(whole.bond(Rule::Source, here, there, &[3.1, 0.0])[0], 0.0);
     }

@@ -11,7 +11,7 @@ pub mod surface;
 pub mod volume;
 
 pub use collocation::Collocation;
-pub use graded::Scaling;
+pub use graded::BondWeighting;
 pub use hybrid::Regions;
 pub use influence::Influence;
 pub use standard::{BondWeights, Operator};

@@ -44,7 +44,7 @@ pub struct CloudWeights {
 
 /// How the weights of a cloud follow from |ξ|, in a form for many bonds side by side.
 #[derive(Debug, Clone)]
-pub struct Profile<'a> {
+pub struct WeightPolynomial<'a> {
     /// Whether they do not: the weight is the volume times `influence[0]`.
     pub plain: bool,
     /// Whether there is no such form.
@@ -180,7 +180,7 @@ impl CloudWeights {
 
     /// The same weights for many bonds side by side, with volumes in multiples of `volume_unit` (m³ in 3D) and numbers
     /// of `single` or double precision.
-    pub fn profile(&self, volume_unit: f64, single: bool) -> Profile<'_> {
+    pub fn profile(&self, volume_unit: f64, single: bool) -> WeightPolynomial<'_> {
         let terms = self.influence.polynomial();
         let ramp =
             matches!(self.fractions, Fractions::Ramp).then(|| [self.horizon + 0.5 * self.spacing, 1.0 / self.spacing]);
@@ -192,7 +192,7 @@ impl CloudWeights {
             Fractions::Weights(weights) => Some((&weights[..], volume_unit)),
             _ => None,
         };
-        Profile {
+        WeightPolynomial {
             plain: matches!((self.influence, &self.fractions), (Influence::Constant, Fractions::Full)),
             singly: terms.is_none(),
             influence: terms.unwrap_or_default().map(|c| c * self.strength * volume_unit),

@@ -3,7 +3,7 @@
 //! The factor λ of a bond depends on its two ends alike, so that momentum is kept, and is one where both have complete
 //! families. Both methods are in the review of Le & Bobaru 2018.
 
-use super::Scaling;
+use super::BondWeighting;
 use super::graded::End;
 use crate::family::{Bond, Rule};
 use crate::field::norm;
@@ -50,7 +50,7 @@ impl<const D: usize> Correction<D> {
     }
 }
 
-impl Scaling {
+impl BondWeighting {
     /// The bonds of a point on an endless lattice of cells of side `size` (m) with this horizon (m): a complete family.
     /// Weighted, and with β V′ behind.
     pub fn complete<const D: usize>(&self, size: f64, horizon: f64, mut each: impl FnMut(&Bond<D, f64>, f64)) {
@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn a_complete_family_with_exact_volumes_is_the_ball() {
         let rule = PartialVolume::Exact;
-        let scaling = Scaling { strength: 1.0, horizon: 3.0, influence: Influence::Constant, rule };
+        let scaling = BondWeighting { strength: 1.0, horizon: 3.0, influence: Influence::Constant, rule };
         let mut sum = 0.0;
         scaling.complete::<2>(0.5, 1.7, |_, volume| sum += volume);
         // The point's own cell is no neighbour.

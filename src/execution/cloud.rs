@@ -9,9 +9,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::packs::{Between, Ends, Instructions, Pack, Packs, SiteView};
+use super::packs::{BondVectors, Instructions, LoadEnds, Pack, Packs, SiteView};
 use super::{BreakRule, Broken, Memory, SharedSlice, StatesPointer};
-use crate::discretization::standard::{CloudWeights, Profile};
+use crate::discretization::standard::{CloudWeights, WeightPolynomial};
 use crate::family::{Bond, BondKernel, CloudFamilies, GROUP};
 use crate::field::Number;
 use crate::lane::polynomial;
@@ -47,7 +47,7 @@ pub struct Sum<'a, const D: usize, const I: usize, const A: usize, const O: usiz
     pub instructions: Instructions,
     pub families: &'a CloudFamilies,
     pub weights: &'a CloudWeights,
-    pub profile: Profile<'a>,
+    pub profile: WeightPolynomial<'a>,
     pub sites: SiteView<'a, P::Site>,
     pub states: StatesPointer,
     /// The input values of a point side by side, and behind them those that are added, as [`gather_input`] puts them.
@@ -104,7 +104,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     #[inline(always)]
     unsafe fn sum_on<V, const SMALL: bool, const PLAIN: bool>(&self, point: usize) -> f64
     where
-        V: Pack<P::Bond> + Ends<P::Field> + Between<P::Site>,
+        V: Pack<P::Bond> + LoadEnds<P::Field> + BondVectors<P::Site>,
     {
         let here = unsafe { self.here::<V>(point) };
         let mut watch = V::splat(0.0);
@@ -165,7 +165,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     #[inline(always)]
     unsafe fn break_on<V, R: BreakRule<D>>(&self, point: usize, rule: &R) -> Broken
     where
-        V: Pack<P::Bond> + Ends<P::Field> + Between<P::Site>,
+        V: Pack<P::Bond> + LoadEnds<P::Field> + BondVectors<P::Site>,
     {
         let threshold = rule.threshold();
         let here = unsafe { self.here::<V>(point) };
@@ -259,7 +259,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     }
 
     #[inline(always)]
-    unsafe fn here<V: Ends<P::Field>>(&self, point: usize) -> Here<V::Held, I, A> {
+    unsafe fn here<V: LoadEnds<P::Field>>(&self, point: usize) -> Here<V::Held, I, A> {
         let value = |c: usize| {
             let record = point + c / 4 * self.n_points();
             // SAFETY: `gather_input` has made records for all values.
@@ -288,7 +288,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         mask: u16,
     ) -> (Bond<D, V>, [V; I], [V; A])
     where
-        V: Pack<P::Bond> + Ends<P::Field> + Between<P::Site>,
+        V: Pack<P::Bond> + LoadEnds<P::Field> + BondVectors<P::Site>,
     {
         let first = group * GROUP + part * V::LANES;
         let sites = &self.sites;

@@ -8,7 +8,7 @@ mod slopes;
 
 pub use fused::Motion;
 
-use super::packs::{Ends, Instructions, Pack, Packs};
+use super::packs::{Instructions, LoadEnds, Pack, Packs};
 use super::{Exec, SharedSlice};
 use crate::discretization::Regions;
 use crate::discretization::collocation::{Pair, RowClass, SharedRow};
@@ -198,7 +198,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// The row at the points of one block; gives the bits of those that are strained too far.
     #[inline(always)]
-    unsafe fn force_on<V: Pack<P::Bond> + Ends<P::Field>>(&self, slot: usize) -> u16 {
+    unsafe fn force_on<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, slot: usize) -> u16 {
         let keep = self.regions.rows(slot);
         let mut beyond = 0;
         for part in 0..BLOCK / V::LANES {
@@ -260,7 +260,12 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// The bits of the points that are strained too far.
     #[inline(always)]
-    unsafe fn beyond<V: Pack<P::Bond> + Ends<P::Field>>(&self, first: usize, here: &[V::Held; D], mask: u16) -> u16 {
+    unsafe fn beyond<V: Pack<P::Bond> + LoadEnds<P::Field>>(
+        &self,
+        first: usize,
+        here: &[V::Held; D],
+        mask: u16,
+    ) -> u16 {
         let mut beyond = 0;
         // SAFETY: as of the row.
         if !unsafe { self.is_calm::<V>(first, here, mask) } {
@@ -278,7 +283,12 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// b of a pair: the values on both sides, less twice the value between.
     #[inline(always)]
-    unsafe fn bend<V: Pack<P::Bond> + Ends<P::Field>>(&self, k: usize, first: usize, twice: &[V::Held; D]) -> [V; D] {
+    unsafe fn bend<V: Pack<P::Bond> + LoadEnds<P::Field>>(
+        &self,
+        k: usize,
+        first: usize,
+        twice: &[V::Held; D],
+    ) -> [V; D] {
         let mut bend = [V::splat(0.0); D];
         for i in 0..D {
             // SAFETY: pairs are of the row, whose reach is inside the input.
@@ -290,7 +300,12 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// Whether all points are strained so little that no limit is near: true nearly everywhere, and quickly seen.
     #[inline(always)]
-    unsafe fn is_calm<V: Pack<P::Bond> + Ends<P::Field>>(&self, first: usize, here: &[V::Held; D], mask: u16) -> bool {
+    unsafe fn is_calm<V: Pack<P::Bond> + LoadEnds<P::Field>>(
+        &self,
+        first: usize,
+        here: &[V::Held; D],
+        mask: u16,
+    ) -> bool {
         let mut squares = V::splat(0.0);
         for d in 0..D {
             for i in 0..D {
@@ -307,7 +322,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// How far the nearest points are strained, and how large the gradient is: positive where that is more than is allowed.
     #[inline(always)]
-    unsafe fn strained<V: Pack<P::Bond> + Ends<P::Field>>(&self, first: usize, here: &[V::Held; D]) -> [V; 2] {
+    unsafe fn strained<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, first: usize, here: &[V::Held; D]) -> [V; 2] {
         let half = V::splat(0.5);
         let (zero, per, products) = (V::splat(0.0), V::broadcast(self.inverse_spacing), V::broadcast(self.products));
         // ∂u_i/∂x_d ahead of and behind the point.
@@ -363,7 +378,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// The row's energy at the points of one block.
     #[inline(always)]
-    unsafe fn energy_on<V: Pack<P::Bond> + Ends<P::Field>>(&self, slot: usize) {
+    unsafe fn energy_on<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, slot: usize) {
         let keep = self.regions.rows(slot);
         for part in 0..BLOCK / V::LANES {
             let first = slot + part * V::LANES;
@@ -394,7 +409,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
     }
 
     #[inline(always)]
-    unsafe fn hold<V: Ends<P::Field>>(&self, first: usize) -> [V::Held; D] {
+    unsafe fn hold<V: LoadEnds<P::Field>>(&self, first: usize) -> [V::Held; D] {
         let mut held = [V::NOTHING; D];
         for i in 0..D {
             held[i] = unsafe { V::hold(self.input[i].0.add(first)) };
@@ -404,7 +419,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// Values `shift` slots ahead and behind.
     #[inline(always)]
-    unsafe fn ends<V: Ends<P::Field>>(&self, component: usize, first: usize, shift: isize) -> [V::Held; 2] {
+    unsafe fn ends<V: LoadEnds<P::Field>>(&self, component: usize, first: usize, shift: isize) -> [V::Held; 2] {
         unsafe {
             let here = self.input[component].0.add(first);
             [V::hold(here.offset(shift)), V::hold(here.offset(-shift))]
@@ -413,7 +428,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// Writes the lanes whose bit is set.
     #[inline(always)]
-    unsafe fn store<V: Pack<P::Bond> + Ends<P::Field>>(&self, value: V, component: usize, first: usize, mask: u16) {
+    unsafe fn store<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, value: V, component: usize, first: usize, mask: u16) {
         let all = u16::MAX >> (BLOCK - V::LANES);
         // SAFETY: the slots of a block are inside the output.
         unsafe {

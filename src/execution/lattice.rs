@@ -6,7 +6,7 @@
 //! The strain is computed by the same operations whichever form follows, so that the form can never change which bond
 //! breaks. The body of the loop is compiled for AVX-512, AVX2 and the baseline and chosen at run time.
 
-use super::packs::{Ends, Instructions, Pack, Packs};
+use super::packs::{Instructions, LoadEnds, Pack, Packs};
 use super::{BreakRule, Broken, Memory, SharedSlice, StatesPointer};
 use crate::family::{Bond, BondKernel, LatticeFamilies};
 use crate::field::{Number, Precision};
@@ -133,7 +133,11 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     /// Mirror images of an offset stand in sequences of their own, which are added as a balanced tree: a mirrored body
     /// has mirrored bits.
     #[inline(always)]
-    unsafe fn sum_on<V: Pack<P::Bond> + Ends<P::Field>, const SMALL: bool>(&self, words: &[u16], slot: usize) -> f64 {
+    unsafe fn sum_on<V: Pack<P::Bond> + LoadEnds<P::Field>, const SMALL: bool>(
+        &self,
+        words: &[u16],
+        slot: usize,
+    ) -> f64 {
         let mut watch = V::splat(0.0);
         for part in 0..BLOCK / V::LANES {
             let first = slot + part * V::LANES;
@@ -197,7 +201,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
 
     /// Asks each whole bond of a block that is strained beyond the threshold whether it breaks, and clears its bit if so.
     #[inline(always)]
-    unsafe fn break_on<V: Pack<P::Bond> + Ends<P::Field>, R: BreakRule<D>>(
+    unsafe fn break_on<V: Pack<P::Bond> + LoadEnds<P::Field>, R: BreakRule<D>>(
         &self,
         words: &mut [u16],
         slot: usize,
@@ -242,7 +246,11 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     }
 
     #[inline(always)]
-    unsafe fn hold<V: Ends<P::Field>, const N: usize>(&self, values: &[&[P::Field]; N], first: usize) -> [V::Held; N] {
+    unsafe fn hold<V: LoadEnds<P::Field>, const N: usize>(
+        &self,
+        values: &[&[P::Field]; N],
+        first: usize,
+    ) -> [V::Held; N] {
         let mut held = [V::NOTHING; N];
         for c in 0..N {
             held[c] = unsafe { V::hold(values[c].as_ptr().add(first)) };
@@ -252,7 +260,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
 
     /// The values that are added, with the other sign: what is relative to them is the sum.
     #[inline(always)]
-    unsafe fn hold_own<V: Ends<P::Field>>(&self, first: usize) -> [V::Held; A] {
+    unsafe fn hold_own<V: LoadEnds<P::Field>>(&self, first: usize) -> [V::Held; A] {
         let mut held = unsafe { self.hold::<V, A>(&self.added, first) };
         for c in 0..A {
             held[c] = V::opposite(held[c]);
@@ -261,7 +269,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     }
 
     #[inline(always)]
-    unsafe fn relative<V: Pack<P::Bond> + Ends<P::Field>, const N: usize>(
+    unsafe fn relative<V: Pack<P::Bond> + LoadEnds<P::Field>, const N: usize>(
         &self,
         values: &[&[P::Field]; N],
         k: usize,

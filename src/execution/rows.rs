@@ -4,7 +4,7 @@
 //! half the products, no masks, nothing to watch. Blocks that lack a bond are summed bond by bond.
 
 use super::lattice;
-use super::packs::{Ends, Instructions, Pack, Packs};
+use super::packs::{Instructions, LoadEnds, Pack, Packs};
 use crate::family::{Bond, BondKernel};
 use crate::field::Number;
 use crate::geometry::lattice::BLOCK;
@@ -73,7 +73,7 @@ impl<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Pack
 
     /// Applies the row at the points of one block; mirror images are added as in the sum over bonds.
     #[inline(always)]
-    unsafe fn sum_on<V: Pack<P::Bond> + Ends<P::Field>>(&self, slot: usize) {
+    unsafe fn sum_on<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, slot: usize) {
         let input = &self.bonds.input;
         for part in 0..BLOCK / V::LANES {
             let first = slot + part * V::LANES;

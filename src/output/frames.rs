@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::snapshot::{Snapshot, Wants};
+use super::snapshot::{FieldRequest, Snapshot};
 use super::source::Points;
 use super::vtu::{FieldData, Grid, Precision, write_pvd, write_vtu};
 use super::writer::Writer;
@@ -26,8 +26,8 @@ impl Frames {
 }
 
 impl Writer for Frames {
-    fn wants(&self) -> Wants {
-        Wants::everywhere(self.fields.clone())
+    fn wants(&self) -> FieldRequest {
+        FieldRequest::everywhere(self.fields.clone())
     }
 
     fn write(&mut self, snapshot: &Snapshot) -> Result<()> {

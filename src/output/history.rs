@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use super::crack_tip::CrackTip;
-use super::snapshot::Look;
+use super::snapshot::FieldCache;
 use super::source::Source;
 use super::table::Table;
 use crate::field::Values;
@@ -73,7 +73,7 @@ impl History {
     }
 
     /// A row if one is due.
-    pub fn row(&mut self, look: &mut Look<'_>, clock: &Clock, last: bool) -> Option<Vec<f64>> {
+    pub fn row(&mut self, look: &mut FieldCache<'_>, clock: &Clock, last: bool) -> Option<Vec<f64>> {
         let due = last || clock.step.is_multiple_of(self.every);
         if !due || self.last_step == Some(clock.step) {
             return None;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::picture::{CloudView, Picture, Sizes, draw, write_png};
-use super::snapshot::{Snapshot, Wants};
+use super::snapshot::{FieldRequest, Snapshot};
 use super::source::{component_of, moved};
 use super::writer::Writer;
 use crate::error::{Error, Result};
@@ -29,12 +29,12 @@ impl Pictures {
 }
 
 impl Writer for Pictures {
-    fn wants(&self) -> Wants {
+    fn wants(&self) -> FieldRequest {
         let mut fields = vec![self.field];
         if self.deform != 0.0 && self.field != "displacement" {
             fields.push("displacement");
         }
-        Wants::everywhere(fields)
+        FieldRequest::everywhere(fields)
     }
 
     fn write(&mut self, snapshot: &Snapshot) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::snapshot::{Snapshot, Wants};
+use super::snapshot::{FieldRequest, Snapshot};
 use super::table::Table;
 use super::writer::Writer;
 use crate::error::Result;
@@ -24,8 +24,8 @@ impl Probe {
 }
 
 impl Writer for Probe {
-    fn wants(&self) -> Wants {
-        Wants::at(self.fields.clone(), self.at)
+    fn wants(&self) -> FieldRequest {
+        FieldRequest::at(self.fields.clone(), self.at)
     }
 
     fn write(&mut self, snapshot: &Snapshot) -> Result<()> {

@@ -12,7 +12,7 @@ pub enum Schedule {
     /// At these times, s, ascending.
     At(Vec<f64>),
     /// The first and the last instant only.
-    Ends,
+    LoadEnds,
     /// The last instant only.
     End,
 }
@@ -27,7 +27,7 @@ impl Schedule {
             Schedule::Steps(n) => clock.step.is_multiple_of(*n),
             Schedule::Every(period) => (now / period).floor() > (before / period).floor(),
             Schedule::At(times) => times.iter().any(|&t| t <= now && t > before),
-            Schedule::Ends => clock.step == 0,
+            Schedule::LoadEnds => clock.step == 0,
             Schedule::End => false,
         }
     }
@@ -38,7 +38,7 @@ impl Schedule {
             Schedule::Steps(n) => steps / n + 1,
             Schedule::Every(period) => ((steps as f64 * dt / period) as u64 + 1).min(steps + 1),
             Schedule::At(times) => times.len() as u64,
-            Schedule::Ends | Schedule::End => 1,
+            Schedule::LoadEnds | Schedule::End => 1,
         }
     }
 }

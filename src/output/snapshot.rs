@@ -9,7 +9,7 @@ use crate::solver::Clock;
 
 /// The fields that a writer wants to be handed.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Wants {
+pub struct FieldRequest {
     pub fields: Vec<&'static str>,
     /// At the point nearest to this place (m) only; everywhere if None.
     pub at: Option<[f64; 3]>,
@@ -17,15 +17,15 @@ pub struct Wants {
     point: Option<usize>,
 }
 
-impl Wants {
+impl FieldRequest {
     /// These fields at all points.
     pub fn everywhere(fields: Vec<&'static str>) -> Self {
-        Wants { fields, at: None, point: None }
+        FieldRequest { fields, at: None, point: None }
     }
 
     /// These fields at the point nearest to a place, m.
     pub fn at(fields: Vec<&'static str>, at: [f64; 3]) -> Self {
-        Wants { fields, at: Some(at), point: None }
+        FieldRequest { fields, at: Some(at), point: None }
     }
 
     /// Finds the place among the points of a body.
@@ -64,16 +64,16 @@ impl Snapshot {
 }
 
 /// A look at a model at one instant, while it stands still.
-pub struct Look<'a> {
+pub struct FieldCache<'a> {
     pub source: &'a mut dyn Source,
     clock: Clock,
     /// Fields that somebody has asked for.
     known: Vec<Arc<Field>>,
 }
 
-impl<'a> Look<'a> {
+impl<'a> FieldCache<'a> {
     pub fn new(source: &'a mut dyn Source, clock: Clock) -> Self {
-        Look { source, clock, known: Vec::new() }
+        FieldCache { source, clock, known: Vec::new() }
     }
 
     /// A field by name; None if the model has no such field.
@@ -87,7 +87,7 @@ impl<'a> Look<'a> {
     }
 
     /// What a writer wants of this instant.
-    pub fn snapshot(&mut self, wants: &Wants) -> Snapshot {
+    pub fn snapshot(&mut self, wants: &FieldRequest) -> Snapshot {
         let fields = match (wants.at, wants.point) {
             (None, _) => wants.fields.iter().filter_map(|name| self.field(name)).collect(),
             (_, None) => Vec::new(),

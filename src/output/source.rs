@@ -18,7 +18,7 @@ pub trait Source {
         &self.points().positions
     }
     /// Facts that change with the points only.
-    fn facts(&self) -> &Facts;
+    fn facts(&self) -> &BodySummary;
     /// A field by name, in point order; None if the model has no such field.
     fn field(&mut self, name: &str) -> Option<Field>;
     /// The same at one point only: a field of one value.
@@ -57,7 +57,7 @@ pub struct Points {
     pub positions: Vec<[f64; 3]>,
     /// Side of the cell of each point, m; empty on a lattice, where it is the spacing.
     pub sizes: Vec<f64>,
-    pub facts: Facts,
+    pub facts: BodySummary,
 }
 
 impl Points {
@@ -69,7 +69,7 @@ impl Points {
 
 /// What is known of a body before the first step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Facts {
+pub struct BodySummary {
     pub dimension: usize,
     pub points: usize,
     /// Directed bonds of the whole body, before pre-cracks.

@@ -144,8 +144,8 @@ fn words(panic: &(dyn Any + Send)) -> &str {
 mod tests {
     use super::*;
     use crate::field::{Field, Values};
-    use crate::output::snapshot::Wants;
-    use crate::output::source::{Facts, Points};
+    use crate::output::snapshot::FieldRequest;
+    use crate::output::source::{BodySummary, Points};
     use crate::output::tests::folder;
     use crate::physics::elasticity::surface::SurfaceEffect;
     use crate::solver::Clock;
@@ -158,8 +158,8 @@ mod tests {
     struct Act<F>(F);
 
     impl<F: FnMut(&Snapshot) -> Result<()> + Send> Writer for Act<F> {
-        fn wants(&self) -> Wants {
-            Wants::default()
+        fn wants(&self) -> FieldRequest {
+            FieldRequest::default()
         }
         fn write(&mut self, snapshot: &Snapshot) -> Result<()> {
             (self.0)(snapshot)
@@ -174,7 +174,7 @@ mod tests {
 
     /// A snapshot of so many numbers.
     fn snapshot(step: u64, numbers: usize) -> Snapshot {
-        let facts = Facts {
+        let facts = BodySummary {
             dimension: 3,
             points: 0,
             bonds: 0,

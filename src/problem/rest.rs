@@ -10,11 +10,11 @@ use crate::execution::Broken;
 use crate::physics::Tangent;
 use crate::solver::Clock;
 use crate::solver::linear::{LinearError, NullSpace, Preconditioner, Sparse, vector};
-use crate::solver::newton::{Equilibrium, Unrest};
+use crate::solver::newton::{Equilibrium, NotConverged};
 use crate::solver::statics::{LoadStep, Statics};
 
 /// A body that a static solver brings to rest.
-struct Rest<'a> {
+struct StaticSystem<'a> {
     body: &'a mut dyn Tangent,
     constraints: &'a mut [Box<dyn Constraint>],
     terms: &'a mut [Box<dyn Term>],
@@ -44,7 +44,7 @@ enum Kind {
 
 /// Forces and displacements at rest: what the work of a step is computed from.
 #[derive(Debug, Clone)]
-struct Resting {
+struct StaticState {
     displacement: Vec<f64>,
     /// Internal force and load on each unknown, N.
     total: Vec<f64>,
@@ -66,7 +66,7 @@ const DEPENDENT: f64 = 1e-9;
 /// to 1e-10, and rounding to 1e-11.
 const DIFFERENCE: f64 = 1e-5;
 
-impl<'a> Rest<'a> {
+impl<'a> StaticSystem<'a> {
     fn new(
         body: &'a mut dyn Tangent,
         constraints: &'a mut [Box<dyn Constraint>],
@@ -75,7 +75,7 @@ impl<'a> Rest<'a> {
     ) -> Self {
         let (displacement, components, slots) = (body.displacement(), body.components(), body.points().n_slots());
         let n = displacement.len();
-        Rest {
+        StaticSystem {
             body,
             constraints,
             terms,
@@ -174,15 +174,15 @@ impl<'a> Rest<'a> {
     }
 
     /// Forces and displacements as they are.
-    pub fn resting(&mut self) -> Resting {
+    pub fn resting(&mut self) -> StaticState {
         let mut total = vec![0.0; self.displacement.len()];
         self.internal(&mut total);
         vector::add(1.0, &self.load, &mut total);
-        Resting { displacement: self.displacement.clone(), total, load: self.load.clone() }
+        StaticState { displacement: self.displacement.clone(), total, load: self.load.clone() }
     }
 
     /// Work from one state to another: mean forces along the way, exact for a linear law.
-    pub fn work(&self, from: &Resting, to: &Resting) -> Work {
+    pub fn work(&self, from: &StaticState, to: &StaticState) -> Work {
         let mut work = Work::default();
         for (k, kind) in self.kind.iter().enumerate() {
             let way = to.displacement[k] - from.displacement[k];
@@ -201,7 +201,7 @@ impl<'a> Rest<'a> {
     }
 
     /// Sets the reactions of prescribed sets: what holds them against the forces of `state`, N.
-    pub fn react(&mut self, state: &Resting) {
+    pub fn react(&mut self, state: &StaticState) {
         let n = self.n;
         for constraint in self.constraints.iter_mut() {
             let (component, slots) = constraint.on();
@@ -230,7 +230,7 @@ impl Problem {
         let end = clock.time();
         let Problem { physics, constraints, terms, .. } = self;
         let body = physics.tangent().expect("checks have refused static solvers of what cannot rest");
-        let mut rest = Rest::new(body, constraints, terms, statics.linearised);
+        let mut rest = StaticSystem::new(body, constraints, terms, statics.linearised);
         let breaking = statics.breaking && rest.body.can_break();
         rest.time = start;
         rest.pose(start);
@@ -267,13 +267,13 @@ impl Problem {
         self.load_steps.push(log);
         match failed {
             None => Ok(true),
-            Some(Unrest::Interrupted) if reached == start => {
+            Some(NotConverged::Interrupted) if reached == start => {
                 *clock = began;
                 Ok(false)
             }
             Some(unrest) => {
-                clock.halt(reached);
-                if unrest == Unrest::Interrupted {
+                clock.end_step_at(reached);
+                if unrest == NotConverged::Interrupted {
                     return Ok(false);
                 }
                 let tried = format!(" (load steps down to 1/{:.0} did no better)", 1.0 / SMALLEST_STEP);
@@ -297,13 +297,13 @@ const WORST: f64 = 0.5;
 /// The books of a load step.
 #[derive(Clone)]
 struct Books {
-    state: Resting,
+    state: StaticState,
     work: Work,
     broken: Broken,
 }
 
 impl Books {
-    fn new(rest: &mut Rest<'_>) -> Self {
+    fn new(rest: &mut StaticSystem<'_>) -> Self {
         Books { state: rest.resting(), work: Work::default(), broken: Broken::default() }
     }
 
@@ -312,14 +312,14 @@ impl Books {
     #[allow(clippy::too_many_arguments)] // a step, how it is taken, and who is told of it
     fn advance(
         &mut self,
-        rest: &mut Rest<'_>,
+        rest: &mut StaticSystem<'_>,
         statics: &Statics,
         breaking: bool,
         t: f64,
         divisible: bool,
         log: &mut LoadStep,
         observe: &mut dyn FnMut(usize, f64) -> bool,
-    ) -> Result<bool, Unrest> {
+    ) -> Result<bool, NotConverged> {
         let mut first = true;
         loop {
             statics.solve(rest, t, log, observe)?;
@@ -348,7 +348,7 @@ impl Books {
     }
 }
 
-impl Equilibrium for Rest<'_> {
+impl Equilibrium for StaticSystem<'_> {
     fn size(&self) -> usize {
         self.displacement.len()
     }
@@ -521,7 +521,7 @@ mod tests {
         let n = D * body.body.cloud.n_slots();
         assert!(matches!(body.body.cloud.arrangement, Arrangement::Lattice(_)) != scattered);
         body.state.displacement = (0..n).map(|k| 0.02 * vector::scattered(k)).collect();
-        let mut rest = Rest::new(&mut body, &mut [], &mut [], false);
+        let mut rest = StaticSystem::new(&mut body, &mut [], &mut [], false);
         rest.pose(0.0);
         for k in (0..n).step_by(7) {
             if rest.kind[k] == Kind::Free {

@@ -12,9 +12,9 @@ pub use model::Model;
 use crate::error::{Error, Result};
 use crate::output::history::History;
 use crate::output::report::{Energy, Hybrid, Refinement, Report, Tip, WallSeconds, peak_memory};
-use crate::output::snapshot::Look;
+use crate::output::snapshot::FieldCache;
 use crate::output::source::{Points, Source};
-use crate::output::writer::{Order, Output};
+use crate::output::writer::{Output, ScheduledRequest};
 use crate::output::writer_thread::{Batch, WriterThread};
 use crate::solver::statics::LoadStep;
 use crate::solver::{Clock, Solver};
@@ -49,7 +49,7 @@ pub trait Stepper: Source + Send {
 
 /// A solver of a chain, and its part of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Leg {
+pub struct SolverStage {
     pub solver: Solver,
     /// s
     pub dt: f64,
@@ -70,7 +70,7 @@ pub struct Simulation {
     /// Of all solvers.
     pub n_steps: u64,
     /// The solvers that follow.
-    pub later: VecDeque<Leg>,
+    pub stages_to_come: VecDeque<SolverStage>,
     pub history: History,
     /// Until the run starts, which hands their writers to the writer thread.
     pub outputs: Vec<Output>,
@@ -96,7 +96,7 @@ pub struct Progress {
 
 /// What an observer of a run asks for after each step, and each iteration of a static solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wish {
+pub enum Control {
     Continue,
     /// Finish this step, or leave this load step at the last state at rest, write the last frame, history and report, and
     /// stop.
@@ -106,7 +106,7 @@ pub enum Wish {
 impl Simulation {
     /// Runs to the end, or until `observe` wishes to stop, or until the numbers do. Whatever ends it, the last frame,
     /// the history and the report are written; a stop on numbers is then returned as the error it is.
-    pub fn run(&mut self, mut observe: impl FnMut(&Progress) -> Wish) -> Result<Report> {
+    pub fn run(&mut self, mut observe: impl FnMut(&Progress) -> Control) -> Result<Report> {
         let begin = Instant::now();
         self.model.start();
         let mut desk = self.desk()?;
@@ -117,7 +117,7 @@ impl Simulation {
             let before = self.progress(begin);
             let stepped = self.step(&mut |iterations, imbalance| {
                 let (seconds, within) = (begin.elapsed().as_secs_f64(), Some((iterations, imbalance)));
-                observe(&Progress { seconds, within, ..before }) == Wish::Continue
+                observe(&Progress { seconds, within, ..before }) == Control::Continue
             });
             match stepped {
                 Ok(true) => {}
@@ -131,7 +131,7 @@ impl Simulation {
                 }
             }
             self.write(&mut desk, false)?;
-            if observe(&self.progress(begin)) == Wish::Stop {
+            if observe(&self.progress(begin)) == Control::Stop {
                 interrupted = self.clock.step < self.n_steps;
                 break;
             }
@@ -157,10 +157,10 @@ impl Simulation {
 
     /// Takes the next step, by the next solver where it is its turn. `observe`: see [`Stepper::step_observed`].
     pub fn step(&mut self, observe: &mut dyn FnMut(usize, f64) -> bool) -> Result<bool> {
-        if let Some(leg) = self.later.front().copied().filter(|leg| leg.first == self.clock.step) {
+        if let Some(leg) = self.stages_to_come.front().copied().filter(|leg| leg.first == self.clock.step) {
             self.model.conclude(&self.solver, &self.clock)?;
-            self.later.pop_front();
-            self.clock.turn(leg.dt);
+            self.stages_to_come.pop_front();
+            self.clock.change_step(leg.dt);
             self.solver = leg.solver;
             self.model.hand_over(&self.solver, self.clock.time());
         }
@@ -168,17 +168,17 @@ impl Simulation {
     }
 
     /// Starts the writer thread.
-    fn desk(&mut self) -> Result<Desk> {
+    fn desk(&mut self) -> Result<OutputQueue> {
         let begin = Instant::now();
         let outputs = std::mem::take(&mut self.outputs).into_iter().map(Output::split);
         let (orders, writers): (Vec<_>, Vec<_>) = outputs.unzip();
         let history = self.history.table(&mut *self.model);
         let thread = WriterThread::start(history, writers, self.threads, &self.folder)?;
-        Ok(Desk { orders, points: None, thread, seconds: begin.elapsed().as_secs_f64() })
+        Ok(OutputQueue { orders, points: None, thread, seconds: begin.elapsed().as_secs_f64() })
     }
 
     /// Takes what is due of this instant and hands it to the writer thread.
-    fn write(&mut self, desk: &mut Desk, last: bool) -> Result<()> {
+    fn write(&mut self, desk: &mut OutputQueue, last: bool) -> Result<()> {
         let begin = Instant::now();
         let clock = self.clock;
         let places = desk.orders.iter().any(|order| order.wants.at.is_some());
@@ -186,7 +186,7 @@ impl Simulation {
             desk.points = Some(self.model.points().clone());
             desk.orders.iter_mut().for_each(|order| order.wants.find(self.model.positions()));
         }
-        let mut look = Look::new(&mut *self.model, clock);
+        let mut look = FieldCache::new(&mut *self.model, clock);
         let row = self.history.row(&mut look, &clock, last);
         let due = desk
             .orders
@@ -282,8 +282,8 @@ impl Simulation {
 }
 
 /// Where the stepping thread and the writer thread meet.
-struct Desk {
-    orders: Vec<Order>,
+struct OutputQueue {
+    orders: Vec<ScheduledRequest>,
     /// Among which the places that orders want have been found.
     points: Option<Arc<Points>>,
     thread: WriterThread,
@@ -291,7 +291,7 @@ struct Desk {
     seconds: f64,
 }
 
-impl Desk {
+impl OutputQueue {
     /// Waits for the writer thread; seconds that the stepping thread spent on output, and that the writers were busy.
     fn close(self) -> Result<(f64, f64)> {
         let begin = Instant::now();
@@ -335,8 +335,8 @@ mod tests {
     use crate::error::NumericalStop;
     use crate::field::{Field, Values};
     use crate::output::schedule::Schedule;
-    use crate::output::snapshot::{Snapshot, Wants};
-    use crate::output::source::Facts;
+    use crate::output::snapshot::{FieldRequest, Snapshot};
+    use crate::output::source::BodySummary;
     use crate::output::writer::Writer;
     use crate::physics::elasticity::surface::SurfaceEffect;
     use crate::physics::{Balance, Column};
@@ -351,7 +351,7 @@ mod tests {
     }
 
     impl Source for Still {
-        fn facts(&self) -> &Facts {
+        fn facts(&self) -> &BodySummary {
             &self.points().facts
         }
         fn points(&self) -> &Arc<Points> {
@@ -419,8 +419,8 @@ mod tests {
     }
 
     impl Writer for Slow {
-        fn wants(&self) -> Wants {
-            Wants::everywhere(vec!["damage"])
+        fn wants(&self) -> FieldRequest {
+            FieldRequest::everywhere(vec!["damage"])
         }
         fn write(&mut self, snapshot: &Snapshot) -> Result<()> {
             std::thread::sleep(std::time::Duration::from_millis(3));
@@ -443,7 +443,7 @@ mod tests {
     fn simulation(name: &str, stops_at: u64, fails_at: u64) -> (Simulation, [Seen; 2]) {
         let folder = std::env::temp_dir().join(format!("bondwise-{}-{name}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
-        let facts = Facts {
+        let facts = BodySummary {
             dimension: 1,
             points: 1,
             bonds: 0,
@@ -470,7 +470,7 @@ mod tests {
             solver: Solver::VelocityVerlet(VelocityVerlet { damping: 0.0 }),
             clock: Clock::new(1.0),
             n_steps: 20,
-            later: VecDeque::new(),
+            stages_to_come: VecDeque::new(),
             history: History::new(folder.join("history.csv"), 5, None),
             outputs: vec![output(2, &seen[0]), output(3, &seen[1])],
             folder,
@@ -487,7 +487,7 @@ mod tests {
     #[test]
     fn every_due_instant_is_written_in_order_and_its_field_computed_once() {
         let (mut simulation, seen) = simulation("order", 0, u64::MAX);
-        let report = simulation.run(|_| Wish::Continue).unwrap();
+        let report = simulation.run(|_| Control::Continue).unwrap();
         assert_eq!(steps(&seen[0]), (0..=10).map(|k| 2 * k).collect::<Vec<_>>());
         assert_eq!(steps(&seen[1]), [0, 3, 6, 9, 12, 15, 18, 20]);
         let mut all: Vec<_> = seen.iter().flat_map(|seen| seen.lock().unwrap().clone()).collect();
@@ -503,9 +503,9 @@ mod tests {
 
     #[test]
     fn a_stop_on_numbers_and_a_wish_to_stop_still_write_the_last_instant_and_the_report() {
-        for (name, stops_at, wish) in [("numbers", 7, Wish::Continue), ("wish", 0, Wish::Stop)] {
+        for (name, stops_at, wish) in [("numbers", 7, Control::Continue), ("wish", 0, Control::Stop)] {
             let (mut simulation, seen) = simulation(name, stops_at, u64::MAX);
-            let ended = simulation.run(|progress| if progress.step == 7 { wish } else { Wish::Continue });
+            let ended = simulation.run(|progress| if progress.step == 7 { wish } else { Control::Continue });
             assert_eq!(steps(&seen[0]), [0, 2, 4, 6, 7], "{name}");
             assert_eq!(steps(&seen[1]), [0, 3, 6, 7], "{name}");
             assert!(simulation.folder.join("report.json").is_file());
@@ -520,7 +520,7 @@ mod tests {
         // Of a writer in the middle of the run, and of one that fails on the last frame of a run that the numbers end.
         for (name, stops_at, fails_at, before) in [("middle", 0, 6, 3), ("last", 7, 7, 6)] {
             let (mut simulation, seen) = simulation(name, stops_at, fails_at);
-            let error = simulation.run(|_| Wish::Continue).unwrap_err();
+            let error = simulation.run(|_| Control::Continue).unwrap_err();
             assert!(matches!(error, Error::Io { .. }) && error.to_string().ends_with(": disk full"), "{error}");
             assert_eq!(steps(&seen[0]).last(), Some(&fails_at));
             assert_eq!(steps(&seen[1]).last(), Some(&before), "what comes after the error is not written");

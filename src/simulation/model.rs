@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use super::Stepper;
 use crate::error::Result;
 use crate::field::Field;
-use crate::output::source::{Facts, Points, Source};
+use crate::output::source::{BodySummary, Points, Source};
 use crate::physics::elasticity::Work;
 use crate::physics::{Adapted, Balance, Column};
 use crate::problem::Problem;
@@ -16,7 +16,7 @@ use crate::visit::Visitor;
 /// A problem, and facts and points of it that are shared with writers.
 pub struct Model {
     pub problem: Problem,
-    facts: Facts,
+    facts: BodySummary,
     /// Made when a writer first asks, and again when points have been replaced.
     points: OnceLock<Arc<Points>>,
     generation: u64,
@@ -24,10 +24,10 @@ pub struct Model {
 
 impl Model {
     /// `facts` as far as the case knows them; counts and sizes are filled in from the problem.
-    pub fn new(problem: Problem, facts: Facts) -> Self {
+    pub fn new(problem: Problem, facts: BodySummary) -> Self {
         let points = problem.points();
         let (dimension, horizon, spacing) = (points.dimension(), points.horizon(), points.spacing());
-        let facts = Facts { dimension, horizon, spacing, ..facts };
+        let facts = BodySummary { dimension, horizon, spacing, ..facts };
         let mut model = Model { problem, facts, points: OnceLock::new(), generation: 0 };
         model.count();
         model
@@ -51,7 +51,7 @@ impl Model {
 }
 
 impl Source for Model {
-    fn facts(&self) -> &Facts {
+    fn facts(&self) -> &BodySummary {
         &self.facts
     }
     fn points(&self) -> &Arc<Points> {

@@ -5,7 +5,7 @@
 //! Underwood 1983). No linear system is solved, so it goes on where tangents are singular.
 
 use super::linear::vector;
-use super::newton::{Equilibrium, Rested, Unrest};
+use super::newton::{Convergence, Equilibrium, NotConverged};
 
 /// Adaptive dynamic relaxation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,29 +26,29 @@ impl DynamicRelaxation {
     /// solver by answering false.
     ///
     /// # Errors
-    /// [`Unrest`]; the displacements are then those of the last step.
+    /// [`NotConverged`]; the displacements are then those of the last step.
     pub fn solve(
         &self,
         system: &mut (impl Equilibrium + ?Sized),
         t: f64,
         observe: &mut dyn FnMut(usize, f64) -> bool,
-    ) -> Result<Rested, Unrest> {
+    ) -> Result<Convergence, NotConverged> {
         let n = system.size();
         let way = system.pose(t);
         vector::add(1.0, &way, system.displacement());
         let mass: Vec<f64> = system.diagonal().into_iter().map(|k| MASS * k).collect();
         let [mut r, mut before, mut velocity, mut moved] = std::array::from_fn(|_| vec![0.0; n]);
         let space = system.floating();
-        let mut rested = Rested::default();
+        let mut rested = Convergence::default();
         for iteration in 0..=self.max_iterations {
             let scale = system.imbalance(&mut r);
             let share = space.balance(&mut r);
             if iteration == 0 && share > super::newton::UNBALANCED {
-                return Err(Unrest::Unbalanced(share));
+                return Err(NotConverged::Unbalanced(share));
             }
             let size = vector::norm(&r);
             if !size.is_finite() {
-                return Err(Unrest::NotFinite);
+                return Err(NotConverged::NotFinite);
             }
             let relative = if size == 0.0 { 0.0 } else { size / scale };
             rested.history.push(relative);
@@ -56,7 +56,7 @@ impl DynamicRelaxation {
                 return Ok(rested);
             }
             if !observe(iteration, relative) {
-                return Err(Unrest::Interrupted);
+                return Err(NotConverged::Interrupted);
             }
             rested.iterations += 1;
             let damping = if iteration == 0 { 0.0 } else { damping(&mass, &r, &before, &velocity, &moved) };
@@ -71,7 +71,7 @@ impl DynamicRelaxation {
             vector::add(1.0, &velocity, system.displacement());
         }
         let residual = rested.history.last().copied().unwrap_or(f64::NAN);
-        Err(Unrest::Iterations { iterations: self.max_iterations, residual })
+        Err(NotConverged::Iterations { iterations: self.max_iterations, residual })
     }
 }
 

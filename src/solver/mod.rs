@@ -71,12 +71,12 @@ impl Clock {
     }
 
     /// From here on, steps of `dt` (s).
-    pub fn turn(&mut self, dt: f64) {
+    pub fn change_step(&mut self, dt: f64) {
         *self = Clock { dt, since: (self.step, self.time()), ..*self };
     }
 
     /// The step that was begun ended early, at `time` (s).
-    pub fn halt(&mut self, time: f64) {
+    pub fn end_step_at(&mut self, time: f64) {
         self.since = (self.step, time);
     }
 }

@@ -46,7 +46,7 @@ pub struct Newton {
 
 /// How a body came to rest.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Rested {
+pub struct Convergence {
     /// |r| over what it is measured against, before each iteration and at the end.
     pub history: Vec<f64>,
     /// Iterations of Newton's method, or of dynamic relaxation.
@@ -57,7 +57,7 @@ pub struct Rested {
 
 /// Why a body did not come to rest.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Unrest {
+pub enum NotConverged {
     /// The share of |loads| along rigid motions.
     #[error("the body can move as a whole, and nothing balances what the loads add up to: hold it, or balance them")]
     Unbalanced(f64),
@@ -77,30 +77,30 @@ pub enum Unrest {
     Linear(LinearError),
 }
 
-impl From<LinearError> for Unrest {
+impl From<LinearError> for NotConverged {
     fn from(error: LinearError) -> Self {
         match error {
-            LinearError::Stopped { cause: Cause::Interrupted, .. } => Unrest::Interrupted,
-            other => Unrest::Linear(other),
+            LinearError::Stopped { cause: Cause::Interrupted, .. } => NotConverged::Interrupted,
+            other => NotConverged::Linear(other),
         }
     }
 }
 
-impl Unrest {
+impl NotConverged {
     /// Whether smaller load steps cannot help. Loads that nothing balances are found before the first step, where
     /// they are compared with rigid motions alone: they are the same at the end of the load step on whatever way it is
     /// reached, and bonds that break on it only free more motions.
     pub fn stays(&self) -> bool {
-        matches!(self, Unrest::Unbalanced(_) | Unrest::Interrupted)
+        matches!(self, NotConverged::Unbalanced(_) | NotConverged::Interrupted)
     }
 
     /// What was left of the loads, as far as it is known.
     pub fn imbalance(&self) -> f64 {
         match self {
-            Unrest::Unbalanced(share) => *share,
-            Unrest::Iterations { residual, .. } | Unrest::Search(residual) => *residual,
-            Unrest::Linear(LinearError::Stopped { residual, .. }) => *residual,
-            Unrest::NotFinite | Unrest::Interrupted | Unrest::Linear(_) => f64::NAN,
+            NotConverged::Unbalanced(share) => *share,
+            NotConverged::Iterations { residual, .. } | NotConverged::Search(residual) => *residual,
+            NotConverged::Linear(LinearError::Stopped { residual, .. }) => *residual,
+            NotConverged::NotFinite | NotConverged::Interrupted | NotConverged::Linear(_) => f64::NAN,
         }
     }
 }
@@ -119,15 +119,15 @@ impl Newton {
     /// imbalance falls. The linear systems are solved as tightly as they need be (Eisenstat & Walker 1996, choice 2).
     ///
     /// # Errors
-    /// [`Unrest`]; the displacements are then those of the last step.
+    /// [`NotConverged`]; the displacements are then those of the last step.
     pub fn solve(
         &self,
         system: &mut (impl Equilibrium + ?Sized),
         t: f64,
         observe: &mut dyn FnMut(usize, f64) -> bool,
-    ) -> Result<Rested, Unrest> {
+    ) -> Result<Convergence, NotConverged> {
         let n = system.size();
-        let (mut r, mut step, mut rested) = (vec![0.0; n], vec![0.0; n], Rested::default());
+        let (mut r, mut step, mut rested) = (vec![0.0; n], vec![0.0; n], Convergence::default());
         let mut way = Some(system.pose(t)).filter(|way| way.iter().any(|w| *w != 0.0));
         let mut scale = system.imbalance(&mut r);
         let space = system.floating();
@@ -142,17 +142,17 @@ impl Newton {
             let size = vector::norm(&r);
             // Later, loads on a body that has turned have a part that turns it further; at first order there is none.
             if rested.history.is_empty() && share > UNBALANCED {
-                return Err(Unrest::Unbalanced(share));
+                return Err(NotConverged::Unbalanced(share));
             }
             if !size.is_finite() {
-                return Err(Unrest::NotFinite);
+                return Err(NotConverged::NotFinite);
             }
             rested.history.push(if size == 0.0 { 0.0 } else { size / scale });
             if size <= self.tolerance * scale && way.is_none() {
                 return Ok(rested);
             }
             if rested.history.len() > self.max_iterations {
-                return Err(Unrest::Iterations { iterations: self.max_iterations, residual: size / scale });
+                return Err(NotConverged::Iterations { iterations: self.max_iterations, residual: size / scale });
             }
             // Reactions to prescribed displacements are not known before the first step; r is of their size.
             let known = if way.is_some() { scale.max(size) } else { scale };
@@ -184,7 +184,7 @@ impl Newton {
                     break;
                 }
                 if halving == HALVINGS {
-                    return Err(Unrest::Search(size / scale));
+                    return Err(NotConverged::Search(size / scale));
                 }
                 share *= 0.5;
                 vector::add(-share, &step, system.displacement());

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::dynamic_relaxation::DynamicRelaxation;
-use super::newton::{Equilibrium, Newton, Unrest};
+use super::newton::{Equilibrium, Newton, NotConverged};
 
 /// A static solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,14 +48,14 @@ impl Statics {
     /// answering false.
     ///
     /// # Errors
-    /// [`Unrest`]; the displacements are then those of the last step.
+    /// [`NotConverged`]; the displacements are then those of the last step.
     pub fn solve(
         &self,
         system: &mut (impl Equilibrium + ?Sized),
         t: f64,
         log: &mut LoadStep,
         observe: &mut dyn FnMut(usize, f64) -> bool,
-    ) -> Result<(), Unrest> {
+    ) -> Result<(), NotConverged> {
         let linear = matches!(self.method, Method::Newton(_));
         let before = if linear { log.linear_iterations } else { log.iterations };
         let mut seen = 0;

@@ -21,7 +21,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::{Measure, Outcome, Row, Study};
 use bondwise::conditions::Stage;
-use bondwise::discretization::collocation::gate::bearable_in_diffusion;
+use bondwise::discretization::collocation::stability::bearable_in_diffusion;
 use bondwise::discretization::quadrature::gauss_legendre;
 use bondwise::discretization::{Collocation, Influence, PartialVolume, standard};
 use bondwise::error::Result;

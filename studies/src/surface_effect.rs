@@ -6,7 +6,7 @@
 
 use super::discrete::discrete_moduli;
 use super::{Measure, Outcome, Row, Study, simulation};
-use bondwise::discretization::{Influence, PartialVolume, Scaling};
+use bondwise::discretization::{BondWeighting, Influence, PartialVolume};
 use bondwise::error::Result;
 use bondwise::field::Values;
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
@@ -120,7 +120,7 @@ surface_correction = "{correction}"
     /// What the box lacks of its energy: of the bonds ξ the share Π (1 − |ξ_d|/L_d) stays inside.
     fn lacking<const D: usize>() -> f64 {
         let (influence, rule) = (Influence::Constant, PartialVolume::Ramp);
-        let scaling = Scaling { strength: 1.0, horizon: 3.0 * SPACING, influence, rule };
+        let scaling = BondWeighting { strength: 1.0, horizon: 3.0 * SPACING, influence, rule };
         let (mut inside, mut all) = (0.0, 0.0);
         scaling.complete::<D>(SPACING, 3.0 * SPACING, |bond, _| {
             let stays = |(d, xi): (usize, &f64)| 1.0 - xi.abs() / if d == 0 { LENGTH } else { WIDTH };

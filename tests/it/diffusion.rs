@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bondwise::conditions::{Load, Prescribed, Profile, Quantity};
+use bondwise::conditions::{FormulaAtPoints, Load, Prescribed, Quantity};
 use bondwise::discretization::{Influence, PartialVolume, standard};
 use bondwise::expression::Expression;
 use bondwise::field::Values;
@@ -26,8 +26,8 @@ fn bar(n: usize, scattered: bool) -> (Diffusing<1>, Arc<[u32]>) {
     (Diffusing::new(body, diffusion), all.into())
 }
 
-fn profile(formula: &str, body: &Diffusing<1>, slots: &Arc<[u32]>) -> Profile {
-    Profile::new(Expression::compile(formula, &["x", "y", "z", "t"], &[]).unwrap(), &body.body.cloud, slots)
+fn profile(formula: &str, body: &Diffusing<1>, slots: &Arc<[u32]>) -> FormulaAtPoints {
+    FormulaAtPoints::new(Expression::compile(formula, &["x", "y", "z", "t"], &[]).unwrap(), &body.body.cloud, slots)
 }
 
 fn march(problem: &mut Problem, dt: f64, steps: u64) {

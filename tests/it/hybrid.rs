@@ -170,11 +170,11 @@ fn compare_behind<const D: usize, P: Packs>(cells: [f64; D], points: usize) {
             displacement: &mut u_behind,
             velocity: &mut v_behind,
             force: &mut force_behind,
-            ahead: &mut ahead_behind,
+            damped: &mut ahead_behind,
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
         let (mut found, sum) = pool.install(|| {
-            let pass = |m: Motion<'_, P::Field>| pass(m.displacement, m.velocity, m.force, m.ahead);
+            let pass = |m: Motion<'_, P::Field>| pass(m.displacement, m.velocity, m.force, m.damped);
             Exec::default().collocate_fused::<D, P>(&body, &row, &regions, motion, &limits, &pass)
         });
         found.sort_unstable();

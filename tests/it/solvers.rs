@@ -6,7 +6,7 @@ use bondwise::case::build::{Options, build};
 use bondwise::case::model::Case;
 use bondwise::case::{bundled, read_text};
 use bondwise::field::Values;
-use bondwise::simulation::{Simulation, Wish};
+use bondwise::simulation::{Control, Simulation};
 
 fn from_text(text: &str) -> Simulation {
     build(&read_text::<Case>("solvers", text, &[]).unwrap(), &Options::default()).unwrap()
@@ -319,7 +319,7 @@ fn a_load_step_is_left_at_the_last_state_at_rest() {
     let report = run
         .run(|progress| {
             within.set(within.get() + usize::from(progress.within.is_some()));
-            if progress.step == 1 && progress.within.is_some() { Wish::Stop } else { Wish::Continue }
+            if progress.step == 1 && progress.within.is_some() { Control::Stop } else { Control::Continue }
         })
         .unwrap();
     assert_eq!((report.status.as_str(), report.steps, report.end_time), ("interrupted", 1, 0.5));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::model::{self, Formula, Motion};
 use super::Builder;
 use crate::conditions::profile::VARIABLES;
-use crate::conditions::{Constraint, Load, Prescribed, Profile, Quantity, Scale, Term};
+use crate::conditions::{Constraint, FormulaAtPoints, Load, Prescribed, Quantity, Scale, Term};
 use crate::error::{Error, Result};
 use crate::expression::{Expression, nearest};
 use crate::field::Vector;
@@ -37,8 +37,8 @@ impl<const D: usize> Builder<'_, D> {
         cloud: &Cloud<D>,
         slots: &Arc<[u32]>,
         path: &str,
-    ) -> Result<Profile> {
-        let mut profile = Profile::new(self.expression(formula)?, cloud, slots);
+    ) -> Result<FormulaAtPoints> {
+        let mut profile = FormulaAtPoints::new(self.expression(formula)?, cloud, slots);
         let values = profile.at(0.0);
         if values.iter().any(|v| !v.is_finite()) {
             // The first bad point in point order, which is not the order of slots.

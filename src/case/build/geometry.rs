@@ -12,7 +12,7 @@ use super::super::model::{
 use super::Builder;
 use super::conditions::rounded;
 use crate::conditions::profile::VARIABLES;
-use crate::discretization::{PartialVolume, Scaling};
+use crate::discretization::{BondWeighting, PartialVolume};
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::family::Rule;
@@ -120,7 +120,7 @@ impl<const D: usize> Builder<'_, D> {
         refinement: &Refinement,
         cloud: &Cloud<D>,
         shape: Option<&Shape<D>>,
-        scaling: Scaling,
+        scaling: BondWeighting,
         cracks: &[Crack<D>],
     ) -> Result<Adaptation<D>> {
         let Arrangement::Lattice(lattice) = &cloud.arrangement else {

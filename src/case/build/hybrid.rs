@@ -2,10 +2,10 @@
 
 use super::super::model;
 use super::Builder;
-use crate::discretization::collocation::gate::{Law, bearable_in_motion};
+use crate::discretization::collocation::stability::{Law, bearable_in_motion};
 use crate::discretization::collocation::{SharedRow, SharedSlope};
 use crate::discretization::moments::ball_moment;
-use crate::discretization::{Collocation, Regions, Scaling};
+use crate::discretization::{BondWeighting, Collocation, Regions};
 use crate::error::{Error, Result};
 use crate::execution::{Limits, Packs};
 use crate::family::{Body, Families};
@@ -24,7 +24,7 @@ impl<const D: usize> Builder<'_, D> {
         settings: &model::Hybrid,
         elasticity: Elasticity<D, P>,
         solid: Option<Moduli>,
-        scaling: &Scaling,
+        scaling: &BondWeighting,
         unit: f64,
     ) -> Result<Elasticity<D, P>> {
         let (body, density, failure) = (&elasticity.body, elasticity.density, &elasticity.failure);
@@ -113,7 +113,7 @@ impl<const D: usize> Builder<'_, D> {
 
 /// Scales the weights of a lattice so that Σ w |ξ| is the integral ∫ c ω |ξ| dV, to which the energy of expansion and the mean
 /// stiffness over all directions are proportional.
-pub(super) fn rescale<const D: usize, P: Packs>(elasticity: &mut Elasticity<D, P>, scaling: &Scaling) {
+pub(super) fn rescale<const D: usize, P: Packs>(elasticity: &mut Elasticity<D, P>, scaling: &BondWeighting) {
     let Families::Lattice(families) = &elasticity.body.families else { return };
     let weights = &mut elasticity.operator.weights.by_offset;
     let sum: f64 = families.offsets.iter().zip(&*weights).map(|(offset, weight)| weight * offset.length).sum();

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::output::crack_tip::CrackTip;
 use crate::output::picture::{ColorMap, Picture, View};
 use crate::output::schedule::Schedule;
-use crate::output::source::Facts;
+use crate::output::source::BodySummary;
 
 impl<const D: usize> Builder<'_, D> {
     pub(super) fn files(&self, schedule: &Schedule, n_steps: u64, dt: f64, path: &str) -> Result<()> {
@@ -19,7 +19,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// With one straight pre-crack in 2D, its own direction is the one to follow.
-    pub(super) fn default_tip(&self, facts: &Facts) -> Option<CrackTip> {
+    pub(super) fn default_tip(&self, facts: &BodySummary) -> Option<CrackTip> {
         match &self.case.value.geometry.cracks[..] {
             [model::Crack::Segment { from, to }] => {
                 let along = [to[0] - from[0], to[1] - from[1], 0.0];
@@ -30,7 +30,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 }
 
-pub(super) fn tip_window(facts: &Facts) -> f64 {
+pub(super) fn tip_window(facts: &BodySummary) -> f64 {
     20.0 * facts.horizon / facts.bar_speed
 }
 
@@ -38,7 +38,7 @@ pub(super) fn schedule(every: Option<f64>, every_steps: Option<u64>, at: &[f64])
     match (every, every_steps, at) {
         (Some(period), ..) => Schedule::Every(period),
         (None, Some(n), _) => Schedule::Steps(n),
-        (None, None, []) => Schedule::Ends,
+        (None, None, []) => Schedule::LoadEnds,
         (None, None, at) => Schedule::At(at.to_vec()),
     }
 }

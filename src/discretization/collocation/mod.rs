@@ -14,9 +14,9 @@
 //!
 //! Deliberately absent: incomplete balls, for which the closed forms do not hold, and which points have rows.
 
-pub mod gate;
 pub mod rows;
 mod shared_row;
+pub mod stability;
 mod state_based;
 mod support;
 pub mod symbol;

@@ -263,7 +263,7 @@ fn extremes<const D: usize>(mut a: [[f64; D]; D]) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gate::Law;
+    use super::super::stability::Law;
     use super::super::{Collocation, support};
     use super::*;
     use crate::discretization::{Influence, PartialVolume};

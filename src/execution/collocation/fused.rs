@@ -22,7 +22,7 @@ pub struct Motion<'a, T> {
     pub velocity: &'a mut [T],
     pub force: &'a mut [T],
     /// What rows act on.
-    pub ahead: &'a mut [T],
+    pub damped: &'a mut [T],
 }
 
 /// What a strip of slabs has found, with the rows near its ends left to do.
@@ -33,7 +33,7 @@ struct Strip {
 }
 
 impl Exec {
-    /// As [`Exec::collocate`] from `ahead` to `force` over all rows, but `pass` first makes `ahead` of the other vectors, called
+    /// As [`Exec::collocate`] from `damped` to `force` over all rows, but `pass` first makes `damped` of the other vectors, called
     /// once for each part. Gives the sum of what it returns, too: in parts of fixed size added in order.
     ///
     /// # Panics
@@ -53,8 +53,8 @@ impl Exec {
             // SAFETY: all D parts are inside.
             std::array::from_fn(|d| SharedSlice(unsafe { flat.as_mut_ptr().add(d * n) }))
         };
-        let Motion { displacement, velocity, force, ahead } = motion;
-        let [u, v, f, ahead] = [displacement, velocity, force, ahead].map(parts);
+        let Motion { displacement, velocity, force, damped } = motion;
+        let [u, v, f, damped] = [displacement, velocity, force, damped].map(parts);
         let make = |slots: Range<usize>| -> f64 {
             // SAFETY: slots between 0 and n, each in one call; rows touch only those that were made before in their own strip,
             // or by any when all are made.
@@ -65,11 +65,11 @@ impl Exec {
                 displacement: part(&u, d),
                 velocity: part(&v, d),
                 force: part(&f, d),
-                ahead: part(&ahead, d),
+                damped: part(&damped, d),
             };
             (0..D).map(|d| pass(motion(d))).sum()
         };
-        let sum = Sum::<D, P>::new(self.instructions, body, regions, ahead, &f, limits).of(row);
+        let sum = Sum::<D, P>::new(self.instructions, body, regions, damped, &f, limits).of(row);
         // SAFETY: as of `collocate`, and what a row reads has been made.
         sum.each_fused(&make, |slot| unsafe { sum.force(slot) })
     }

@@ -4,7 +4,7 @@ use super::{BondSlope, Limits, SharedSlice, Sum};
 use crate::discretization::Regions;
 use crate::discretization::collocation::{RowClass, SharedSlope, SlopePair};
 use crate::execution::Exec;
-use crate::execution::packs::{Ends, Instructions, Pack, Packs};
+use crate::execution::packs::{Instructions, LoadEnds, Pack, Packs};
 use crate::family::Body;
 use crate::field::Number;
 use crate::geometry::lattice::BLOCK;
@@ -63,7 +63,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// The slope's Σ g · (u_j − u) at the points of one block; gives the bits of those that are strained too far.
     #[inline(always)]
-    unsafe fn divergence_on<V: Pack<P::Bond> + Ends<P::Field>>(&self, slot: usize) -> u16 {
+    unsafe fn divergence_on<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, slot: usize) -> u16 {
         let keep = self.regions.rows(slot);
         let mut beyond = 0;
         for part in 0..BLOCK / V::LANES {
@@ -99,7 +99,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// Adds the slope's Σ g (p_j − p) at the points of one block.
     #[inline(always)]
-    unsafe fn gradient_on<V: Pack<P::Bond> + Ends<P::Field>>(&self, slot: usize) {
+    unsafe fn gradient_on<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, slot: usize) {
         let keep = self.regions.rows(slot);
         for part in 0..BLOCK / V::LANES {
             let first = slot + part * V::LANES;
@@ -132,7 +132,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// Σ over the images of a member of a class of a(x + ξ) − a(x − ξ), with the sign of ξ along an axis of the class.
     #[inline(always)]
-    unsafe fn across<V: Pack<P::Bond> + Ends<P::Field>>(
+    unsafe fn across<V: Pack<P::Bond> + LoadEnds<P::Field>>(
         &self,
         field: SharedSlice<P::Field>,
         k: usize,
@@ -164,7 +164,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
 
     /// a(x + ξ) − a(x − ξ)
     #[inline(always)]
-    unsafe fn step<V: Pack<P::Bond> + Ends<P::Field>>(&self, here: *const P::Field, k: usize) -> V {
+    unsafe fn step<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, here: *const P::Field, k: usize) -> V {
         unsafe {
             let shift = self.slopes.get_unchecked(k).shift;
             V::relative(V::hold(here.offset(shift)), V::hold(here.offset(-shift)), u16::MAX)

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-use super::{Between, Ends, GUESS_DOUBLE, GUESS_SINGLE, Pack};
+use super::{BondVectors, GUESS_DOUBLE, GUESS_SINGLE, LoadEnds, Pack};
 use crate::field::Number;
 use crate::lane::Lane;
 
@@ -140,7 +140,7 @@ numbers!(f32, u32, true, GUESS_SINGLE);
 
 macro_rules! ends {
     ($bond:ty, $field:ty) => {
-        impl<const FUSED: bool> Ends<$field> for Array<$bond, FUSED> {
+        impl<const FUSED: bool> LoadEnds<$field> for Array<$bond, FUSED> {
             type Held = [$field; N];
             const NOTHING: Self::Held = [0.0; N];
             #[inline(always)]
@@ -207,10 +207,10 @@ ends!(f64, f64);
 ends!(f32, f32);
 ends!(f32, f64);
 
-impl<const FUSED: bool> Between<[f64; 4]> for Array<f64, FUSED> {
+impl<const FUSED: bool> BondVectors<[f64; 4]> for Array<f64, FUSED> {
     #[inline(always)]
     unsafe fn between(sites: *const [f64; 4], index: *const u32, here: [f64; 4], _unit: f64) -> ([Self; 3], Self) {
-        let [x, y, z, volume] = unsafe { <Self as Ends<f64>>::gather(sites, index) };
+        let [x, y, z, volume] = unsafe { <Self as LoadEnds<f64>>::gather(sites, index) };
         let mut xi = [Array(x), Array(y), Array(z)];
         for d in 0..3 {
             for k in 0..N {
@@ -221,7 +221,7 @@ impl<const FUSED: bool> Between<[f64; 4]> for Array<f64, FUSED> {
     }
 }
 
-impl<const FUSED: bool> Between<[i32; 4]> for Array<f32, FUSED> {
+impl<const FUSED: bool> BondVectors<[i32; 4]> for Array<f32, FUSED> {
     #[inline(always)]
     unsafe fn between(sites: *const [i32; 4], index: *const u32, here: [i32; 4], unit: f64) -> ([Self; 3], Self) {
         let (mut xi, mut volume) = ([Array([0.0; N]); 3], Array([0.0; N]));

@@ -6,7 +6,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
-use super::{Between, Ends, GUESS_DOUBLE, GUESS_SINGLE, KEEP, Pack};
+use super::{BondVectors, GUESS_DOUBLE, GUESS_SINGLE, KEEP, LoadEnds, Pack};
 use crate::lane::Lane;
 
 const N: usize = 8;
@@ -151,7 +151,7 @@ impl Pack<f64> for F64 {
     }
     #[inline(always)]
     unsafe fn put(self, target: *mut f64) {
-        unsafe { Ends::<f64>::store(self, target) }
+        unsafe { LoadEnds::<f64>::store(self, target) }
     }
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {
@@ -212,7 +212,7 @@ impl Pack<f32> for F32 {
     }
     #[inline(always)]
     unsafe fn put(self, target: *mut f32) {
-        unsafe { Ends::<f32>::store(self, target) }
+        unsafe { LoadEnds::<f32>::store(self, target) }
     }
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {
@@ -277,7 +277,7 @@ unsafe fn gather_single(records: *const [f32; 4], index: *const u32) -> [__m256;
     }
 }
 
-impl Between<[f64; 4]> for F64 {
+impl BondVectors<[f64; 4]> for F64 {
     #[inline(always)]
     unsafe fn between(sites: *const [f64; 4], index: *const u32, here: [f64; 4], _unit: f64) -> ([Self; 3], Self) {
         let [x, y, z, volume] = unsafe { gather(sites, index) };
@@ -286,7 +286,7 @@ impl Between<[f64; 4]> for F64 {
     }
 }
 
-impl Between<[i32; 4]> for F32 {
+impl BondVectors<[i32; 4]> for F32 {
     #[inline(always)]
     unsafe fn between(sites: *const [i32; 4], index: *const u32, here: [i32; 4], unit: f64) -> ([Self; 3], Self) {
         unsafe {
@@ -300,7 +300,7 @@ impl Between<[i32; 4]> for F32 {
     }
 }
 
-impl Ends<f64> for F64 {
+impl LoadEnds<f64> for F64 {
     type Held = [__m256d; 2];
     // SAFETY: zeros are numbers.
     const NOTHING: Self::Held = unsafe { std::mem::zeroed() };
@@ -341,7 +341,7 @@ impl Ends<f64> for F64 {
     }
 }
 
-impl Ends<f32> for F32 {
+impl LoadEnds<f32> for F32 {
     type Held = __m256;
     // SAFETY: zeros are numbers.
     const NOTHING: Self::Held = unsafe { std::mem::zeroed() };
@@ -379,7 +379,7 @@ impl Ends<f32> for F32 {
     }
 }
 
-impl Ends<f64> for F32 {
+impl LoadEnds<f64> for F32 {
     type Held = [__m256d; 2];
     // SAFETY: zeros are numbers.
     const NOTHING: Self::Held = unsafe { std::mem::zeroed() };
@@ -401,15 +401,15 @@ impl Ends<f64> for F32 {
     }
     #[inline(always)]
     fn opposite(here: Self::Held) -> Self::Held {
-        <F64 as Ends<f64>>::opposite(here)
+        <F64 as LoadEnds<f64>>::opposite(here)
     }
     #[inline(always)]
     fn twice(here: Self::Held) -> Self::Held {
-        <F64 as Ends<f64>>::twice(here)
+        <F64 as LoadEnds<f64>>::twice(here)
     }
     #[inline(always)]
     fn bend(after: Self::Held, before: Self::Held, twice: Self::Held) -> Self {
-        narrow(<F64 as Ends<f64>>::bend(after, before, twice))
+        narrow(<F64 as LoadEnds<f64>>::bend(after, before, twice))
     }
     #[inline(always)]
     unsafe fn store(self, target: *mut f64) {

@@ -120,7 +120,7 @@ pub trait Pack<B: Number>: Lane {
 }
 
 /// Packs that are filled from fields of numbers `F`.
-pub trait Ends<F: Number>: Sized {
+pub trait LoadEnds<F: Number>: Sized {
     /// Values as they stand in the field.
     type Held: Copy;
     const NOTHING: Self::Held;
@@ -138,7 +138,7 @@ pub trait Ends<F: Number>: Sized {
     unsafe fn gather(records: *const [F; 4], index: *const u32) -> [Self::Held; 4];
     /// Values there less values here, zero in lanes without a bit.
     fn relative(there: Self::Held, here: Self::Held, mask: u16) -> Self;
-    /// Values with the other sign: what [`Ends::relative`] takes them from is added to them.
+    /// Values with the other sign: what [`LoadEnds::relative`] takes them from is added to them.
     fn opposite(here: Self::Held) -> Self::Held;
     /// Twice the values.
     fn twice(here: Self::Held) -> Self::Held;
@@ -150,12 +150,12 @@ pub trait Ends<F: Number>: Sized {
 }
 
 /// Packs that find the ξ of bonds between points of a cloud.
-pub trait Between<S>: Sized {
+pub trait BondVectors<S>: Sized {
     /// ξ of the bonds from `here` to the sites that `index` names (m; coordinates are multiples of `unit`), and the
     /// volumes there.
     ///
     /// # Safety
-    /// As [`Ends::gather`].
+    /// As [`LoadEnds::gather`].
     unsafe fn between(sites: *const S, index: *const u32, here: S, unit: f64) -> ([Self; 3], Self);
 }
 
@@ -168,13 +168,13 @@ pub trait Packs: Precision {
     fn records<'a>(double: &'a mut Vec<[f64; 4]>, single: &'a mut Vec<[f32; 4]>) -> &'a mut Vec<[Self::Field; 4]>;
     /// Of what every processor of the architecture has. x86-64 has no fused multiply-add there, so that results differ
     /// from those of wider instructions in the last bits.
-    type Baseline: Pack<Self::Bond> + Ends<Self::Field> + Between<Self::Site>;
+    type Baseline: Pack<Self::Bond> + LoadEnds<Self::Field> + BondVectors<Self::Site>;
     /// Of AVX2 with fused multiply-add.
     #[cfg(target_arch = "x86_64")]
-    type Avx2: Pack<Self::Bond> + Ends<Self::Field> + Between<Self::Site>;
+    type Avx2: Pack<Self::Bond> + LoadEnds<Self::Field> + BondVectors<Self::Site>;
     /// Of AVX-512 (F, DQ, BW, VL).
     #[cfg(target_arch = "x86_64")]
-    type Avx512: Pack<Self::Bond> + Ends<Self::Field> + Between<Self::Site>;
+    type Avx512: Pack<Self::Bond> + LoadEnds<Self::Field> + BondVectors<Self::Site>;
 }
 
 /// Whether the baseline of the target fuses multiplications with additions, as NEON does.

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::discretization::collocation::gate::Law;
+use crate::discretization::collocation::stability::Law;
 use crate::discretization::moments::ball_moment;
 use crate::discretization::volume::RIM_TOLERANCE;
 use crate::discretization::{BondWeights, Collocation, Influence, Operator, PartialVolume};

@@ -10,7 +10,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{Elasticity, Physics, Replaced};
-use crate::discretization::Scaling;
+use crate::discretization::BondWeighting;
 use crate::execution::Packs;
 use crate::execution::gradients::{gradients, largest};
 use crate::expression::Expression;
@@ -29,7 +29,7 @@ pub const INDICATORS: [&str; 4] = ["energy", "jump", "stretch", "damage"];
 /// How the cells of a body are refined.
 pub struct Adaptation<const D: usize> {
     pub cells: Cells<D>,
-    pub scaling: Scaling,
+    pub scaling: BondWeighting,
     pub rule: Rule,
     /// m = δ/Δx
     pub ratio: f64,
@@ -442,7 +442,7 @@ mod tests {
         let cloud = Cloud::lattice(&Shape::Box { low: [0.0; D], high }, H, 4);
         let Arrangement::Lattice(lattice) = &cloud.arrangement else { panic!("a lattice") };
         let scaling =
-            Scaling { strength: 1.0, horizon: 3.0 * H, influence: Influence::Linear, rule: PartialVolume::Ramp };
+            BondWeighting { strength: 1.0, horizon: 3.0 * H, influence: Influence::Linear, rule: PartialVolume::Ramp };
         let names = ["x", "y", "z", "t", "energy", "jump", "stretch", "damage"];
         let mut adaptation = Adaptation {
             cells: Cells::new(lattice, &cloud.slots, 2),

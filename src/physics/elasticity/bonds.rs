@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::State;
 use super::kernels::{Diagonal, DiagonalRow, Energy, Force, Spring};
-use super::material::{Edge, Material, On};
+use super::material::{Material, On, RowBoundary};
 use super::surface::{Shares, shares_of_bonds};
-use crate::discretization::{BondWeights, Scaling};
+use crate::discretization::{BondWeighting, BondWeights};
 use crate::execution::{BlockRow, BreakRule, Broken, Exec, Packs, Unbreakable};
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
 use crate::field::{Double, Number, components, components_mut, dot};
@@ -70,7 +70,13 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
         (2.0 * density / stiffest).sqrt()
     }
 
-    fn first_pass(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>, edge: Option<&Edge<'_>>) {
+    fn first_pass(
+        &mut self,
+        on: &mut On<'_, D>,
+        state: &mut State<P>,
+        step: Option<f64>,
+        edge: Option<&RowBoundary<'_>>,
+    ) {
         let State { displacement, velocity, force, states, broken } = state;
         let (u, force, kernel) = (components::<D, _>(displacement), components_mut::<D, _>(force), Force(self.law));
         let weights = &on.operator.weights;
@@ -157,7 +163,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
         P::Bond::visit(&mut self.memory, "memory_of_bonds", visitor);
     }
 
-    fn shares(&self, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
+    fn shares(&self, on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares {
         shares_of_bonds(on, scaling)
     }
 }
@@ -169,7 +175,7 @@ struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
     displacement: [&'a [F]; D],
     velocity: [&'a [F]; D],
     dt: f64,
-    edge: Option<&'a Edge<'a>>,
+    edge: Option<&'a RowBoundary<'a>>,
 }
 
 impl<const D: usize, L: BondLaw<D>, F: Number> BreakRule<D> for Breaking<'_, D, L, F> {

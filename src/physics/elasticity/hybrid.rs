@@ -13,10 +13,10 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
 use super::State;
-use super::material::{Edge, Material, On, Overstretched};
+use super::material::{Material, On, Overstretched, RowBoundary};
 use super::surface::Shares;
 use crate::discretization::collocation::{SharedRow, SharedSlope};
-use crate::discretization::{BondWeights, Regions, Scaling};
+use crate::discretization::{BondWeighting, BondWeights, Regions};
 use crate::execution::{BlockRow, Broken, Exec, Limits, Motion, Packs};
 use crate::family::{Body, Bond, BondStates, Families};
 use crate::field::{Number, components, components_mut};
@@ -154,7 +154,7 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
 
     /// The first pass of the points that sum their bonds, and which bonds are beyond their critical stretch.
     fn first_pass_of_bonds(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>) -> Overstretched {
-        let edge = Edge { regions: &self.regions, overstretched: Mutex::default() };
+        let edge = RowBoundary { regions: &self.regions, overstretched: Mutex::default() };
         let (inner, damped) = (&mut self.inner, &mut self.damped_displacement);
         with_damped_displacement(damped, if self.damps_bonds { self.damping } else { 0.0 }, state, |state| {
             inner.first_pass(on, state, step, Some(&edge));
@@ -305,7 +305,7 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
     }
 
     /// The regions are its own: it is asked to [`evolve`](Material::evolve) and [`evaluate`](Material::evaluate) only.
-    fn first_pass(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>, _: Option<&Edge<'_>>) {
+    fn first_pass(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>, _: Option<&RowBoundary<'_>>) {
         match step {
             Some(dt) => self.evolve(on, state, dt),
             None => self.evaluate(on, state),
@@ -367,7 +367,7 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
         self.inner.strain_ratio(bond, eta, critical)
     }
 
-    fn shares(&self, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
+    fn shares(&self, on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares {
         self.inner.shares(on, scaling)
     }
 
@@ -403,8 +403,8 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
             return None;
         }
         let State { displacement, velocity, force, .. } = state;
-        let motion = Motion { displacement, velocity, force, ahead: &mut self.damped_displacement };
-        let pass = |m: Motion<'_, P::Field>| drift.pass(m.displacement, m.velocity, m.force, m.ahead);
+        let motion = Motion { displacement, velocity, force, damped: &mut self.damped_displacement };
+        let pass = |m: Motion<'_, P::Field>| drift.pass(m.displacement, m.velocity, m.force, m.damped);
         let (row, regions, limits) = (&self.row, &self.regions, &self.limits);
         let (strained, squares) = on.exec.collocate_fused::<D, P>(on.body, row, regions, motion, limits, &pass);
         self.sum_bonds_and_switch(&strained, on, state, dt);

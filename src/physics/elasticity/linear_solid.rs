@@ -37,9 +37,9 @@ use super::State;
 use super::kernels::Energy;
 use super::laws::bond_based::{FORCE_SINGLE, STRETCH_SINGLE};
 use super::laws::{BondBased, BondBasedLinear};
-use super::material::{Edge, Material, On};
+use super::material::{Material, On, RowBoundary};
 use super::surface::{Shares, shares_of_solid};
-use crate::discretization::{BondWeights, Scaling};
+use crate::discretization::{BondWeighting, BondWeights};
 use crate::execution::{BreakRule, Exec, Packs};
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates};
 use crate::field::{Double, Number, components, components_mut, dot};
@@ -185,7 +185,13 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
     }
 
     /// S, and p of it.
-    fn first_pass(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>, edge: Option<&Edge<'_>>) {
+    fn first_pass(
+        &mut self,
+        on: &mut On<'_, D>,
+        state: &mut State<P>,
+        step: Option<f64>,
+        edge: Option<&RowBoundary<'_>>,
+    ) {
         let [u, v] = [&state.displacement, &state.velocity].map(|flat| components::<D, _>(flat));
         let n = on.body.cloud.n_slots();
         let [mut now, mut before] = std::mem::take(&mut self.dilatation_force);
@@ -263,7 +269,7 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
         self.law.strain(bond, eta) / self.law.strain_at(critical)
     }
 
-    fn shares(&self, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
+    fn shares(&self, on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares {
         shares_of_solid(&self.moduli, on, scaling)
     }
 
@@ -481,7 +487,7 @@ struct Breaking<'a, const D: usize, B, F> {
     displacement: [&'a [F]; D],
     velocity: [&'a [F]; D],
     dt: f64,
-    edge: Option<&'a Edge<'a>>,
+    edge: Option<&'a RowBoundary<'a>>,
     lost: Mutex<Vec<Lost>>,
 }
 

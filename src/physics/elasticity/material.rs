@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicU64;
 use super::State;
 use super::hybrid::Work;
 use super::surface::Shares;
-use crate::discretization::{BondWeights, Operator, Regions, Scaling};
+use crate::discretization::{BondWeighting, BondWeights, Operator, Regions};
 use crate::execution::{BlockRow, Broken, Exec, Packs};
 use crate::family::{Body, Bond, BondStates};
 use crate::physics::failure::CriticalStretch;
@@ -48,7 +48,13 @@ pub trait Material<const D: usize, P: Packs>: Send + Sync {
     fn begin(&mut self) {}
     /// Breaks what breaks, unless there is no step, and sums what the second pass needs, or the force density if there is
     /// none. `edge`: the points whose bonds are not asked, if any.
-    fn first_pass(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>, edge: Option<&Edge<'_>>);
+    fn first_pass(
+        &mut self,
+        on: &mut On<'_, D>,
+        state: &mut State<P>,
+        step: Option<f64>,
+        edge: Option<&RowBoundary<'_>>,
+    );
     /// Fills the force density from what the first pass left.
     fn second_pass(&mut self, _on: &mut On<'_, D>, _state: &mut State<P>) {}
     /// What dilatation pulls with at each slot, which the first pass fills and others may; None where there is none.
@@ -97,7 +103,7 @@ pub trait Material<const D: usize, P: Packs>: Send + Sync {
     /// Strain of a bond over its critical strain, in the measure of the law. `critical`: its critical stretch.
     fn strain_ratio(&self, bond: &Bond<D, f64>, eta: &[f64; D], critical: f64) -> f64;
     /// Energy densities of unit strain over those of a complete family.
-    fn shares(&self, on: &mut On<'_, D>, scaling: &Scaling) -> Shares;
+    fn shares(&self, on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares;
 
     /// Where points sum their bonds, by slot: 1, and 0 where they have a row.
     fn scheme(&self, _slot: usize) -> f64 {
@@ -143,7 +149,7 @@ pub trait Material<const D: usize, P: Packs>: Send + Sync {
 }
 
 /// Where bonds end at points with a row, which stands for unbroken bonds: such bonds do not break, and are told of.
-pub struct Edge<'a> {
+pub struct RowBoundary<'a> {
     pub regions: &'a Regions,
     pub overstretched: Mutex<Overstretched>,
 }
@@ -157,7 +163,7 @@ pub struct Overstretched {
     pub held: Vec<u32>,
 }
 
-impl Edge<'_> {
+impl RowBoundary<'_> {
     /// Takes note of a bond; whether it may break.
     pub(super) fn may_break(&self, here: usize, there: usize) -> bool {
         let free = !self.regions.has_row(here) && !self.regions.has_row(there);

@@ -21,7 +21,7 @@ pub use bonds::Bonds;
 pub use hybrid::{Hybrid, Work};
 use kernels::bonded_volume;
 pub use linear_solid::LinearSolid;
-pub use material::{Edge, Material, On, Overstretched};
+pub use material::{Material, On, Overstretched, RowBoundary};
 
 use super::{Adapted, Balance, Column, Content, FieldInfo, Physics, Points, Replaced};
 use crate::discretization::Operator;

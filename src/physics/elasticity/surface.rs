@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::kernels::{bonded_volume, spring};
 use super::linear_solid::Moduli;
 use super::material::{Material, On};
-use crate::discretization::{Correction, Scaling};
+use crate::discretization::{BondWeighting, Correction};
 use crate::execution::Packs;
 use crate::family::{Bond, BondKernel, BondStates};
 use crate::field::Double;
@@ -39,7 +39,7 @@ pub type Shares = [Vec<f64>; 4];
 pub fn surface_effect<const D: usize, P: Packs>(
     material: &dyn Material<D, P>,
     on: &mut On<'_, D>,
-    scaling: &Scaling,
+    scaling: &BondWeighting,
 ) -> SurfaceEffect {
     let shares = material.shares(on, scaling);
     let cloud = &on.body.cloud;
@@ -59,7 +59,7 @@ pub fn surface_effect<const D: usize, P: Packs>(
 pub fn correction_by_energy<const D: usize, P: Packs>(
     material: &dyn Material<D, P>,
     on: &mut On<'_, D>,
-    scaling: &Scaling,
+    scaling: &BondWeighting,
 ) -> Correction<D> {
     let shares = material.shares(on, scaling);
     let factors = |slot: usize| std::array::from_fn(|d| 1.0 / shares[d][slot]);
@@ -67,7 +67,7 @@ pub fn correction_by_energy<const D: usize, P: Packs>(
 }
 
 /// The volume method's correction of a body that has one horizon.
-pub fn correction_by_volume<const D: usize>(on: &mut On<'_, D>, scaling: &Scaling) -> Correction<D> {
+pub fn correction_by_volume<const D: usize>(on: &mut On<'_, D>, scaling: &BondWeighting) -> Correction<D> {
     let body = on.body;
     let mut shares = vec![0.0; body.cloud.n_slots()];
     bonded_volume(on.exec, body, &on.operator.volumes, &BondStates::whole(body), &mut shares);
@@ -88,7 +88,7 @@ fn energies<const D: usize>(on: &mut On<'_, D>) -> Shares {
 }
 
 /// [`Shares`] of a material of bonds.
-pub(super) fn shares_of_bonds<const D: usize>(on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
+pub(super) fn shares_of_bonds<const D: usize>(on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares {
     let mut shares = energies(on);
     let (body, kernel) = (on.body, UnitStrain);
     let complete = |size, horizon| {
@@ -120,7 +120,7 @@ pub(super) fn shares_of_bonds<const D: usize>(on: &mut On<'_, D>, scaling: &Scal
 
 /// [`Shares`] of a body whose points have a weighted volume of their own, from the sums of the energies of bonds. Unit
 /// strain in all directions has the energy of a complete family everywhere.
-pub(super) fn shares_of_solid<const D: usize>(moduli: &Moduli, on: &mut On<'_, D>, scaling: &Scaling) -> Shares {
+pub(super) fn shares_of_solid<const D: usize>(moduli: &Moduli, on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares {
     let mut shares = energies(on);
     let body = on.body;
     let mut squares: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; body.cloud.n_slots()]);

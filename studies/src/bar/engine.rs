@@ -1,7 +1,7 @@
 //! The bar on the engine: every call of these studies into the engine stands here.
 //!
 //! A [`Bar`] becomes a graded body of the engine: a cloud on a line, cells that may lie off their nodes, families and
-//! bond weights by [`Scaling`], the linear law, sums over bonds by [`Exec`]. Its equilibria are solved with the engine's
+//! bond weights by [`BondWeighting`], the linear law, sums over bonds by [`Exec`]. Its equilibria are solved with the engine's
 //! sparse factors, its motion is marched by the engine's Runge-Kutta method.
 //!
 //! Nothing breaks and the law is linear, so that the stiffness of each bond is a number: it is kept in the engine's rows
@@ -11,7 +11,7 @@
 use super::micromodulus::Micromodulus;
 use super::model::{Bar, Cover, Model, Motion, Rule};
 use bondwise::conditions::Stage;
-use bondwise::discretization::{Influence, Operator, PartialVolume, Scaling};
+use bondwise::discretization::{BondWeighting, Influence, Operator, PartialVolume};
 use bondwise::execution::{Exec, PointRows};
 use bondwise::family::{self, Body, Bond, BondKernel, BondLaw, BondStates, Grading, Update};
 use bondwise::field::{Double, Number};
@@ -26,7 +26,7 @@ use bondwise::unknown::{Numbers, Unknown, Vectors};
 
 /// A bar as a body of the engine.
 pub struct EngineBar {
-    scaling: Scaling,
+    scaling: BondWeighting,
     body: Body<1>,
     operator: Operator,
     states: BondStates,
@@ -38,7 +38,7 @@ pub struct EngineBar {
 }
 
 impl EngineBar {
-    fn on(scaling: Scaling, body: Body<1>, update: &Update, old: Option<(&Operator, &Body<1>)>) -> Self {
+    fn on(scaling: BondWeighting, body: Body<1>, update: &Update, old: Option<(&Operator, &Body<1>)>) -> Self {
         let operator = scaling.operator(&body, update, old, None);
         let states = BondStates::whole(&body);
         let rest = vec![0.0; body.cloud.n_slots()];
@@ -176,7 +176,7 @@ fn grading(bar: &Bar) -> Grading {
     }
 }
 
-fn scaling(bar: &Bar) -> Scaling {
+fn scaling(bar: &Bar) -> BondWeighting {
     let influence = match bar.micromodulus {
         Micromodulus::Constant => Influence::Constant,
         Micromodulus::Triangular => Influence::Linear,
@@ -187,7 +187,7 @@ fn scaling(bar: &Bar) -> Scaling {
         Cover::Whole => PartialVolume::None,
     };
     let horizon = bar.horizon.iter().copied().fold(0.0, f64::max);
-    Scaling { strength: micromodulus(Hypothesis::Bar, &influence, 1.0, horizon), horizon, influence, rule }
+    BondWeighting { strength: micromodulus(Hypothesis::Bar, &influence, 1.0, horizon), horizon, influence, rule }
 }
 
 /// Σ f
