@@ -81,8 +81,9 @@ impl History {
         self.last_step = Some(clock.step);
         let b = look.source.balance();
         self.balance = b;
-        self.largest_defect = self.largest_defect.max(b.defect().abs());
-        self.largest_scale = self.largest_scale.max(b.scale());
+        let [defect, scale] = look.source.defect(&b);
+        self.largest_defect = self.largest_defect.max(defect.abs());
+        self.largest_scale = self.largest_scale.max(scale);
         self.largest_momentum_defect = self.largest_momentum_defect.max(b.momentum_defect);
         self.largest_momentum_scale = self.largest_momentum_scale.max(b.momentum_scale);
         if let Some(tip) = &mut self.tip

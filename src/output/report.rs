@@ -42,7 +42,10 @@ pub struct Report {
     /// Null where the system does not tell.
     pub peak_memory_bytes: Option<u64>,
     pub energy: Energy,
-    /// Largest energy defect over the largest of external work and initial energy.
+    /// The books at the end, by the names that the physics gives them: the columns of the history.
+    pub books: serde_json::Map<String, serde_json::Value>,
+    /// Largest defect of what is kept over what it is measured against: of energy, the largest of external work and initial
+    /// energy.
     pub energy_imbalance: f64,
     /// Largest momentum defect over the largest Σ ρ |v| V.
     pub momentum_error: f64,

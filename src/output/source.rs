@@ -24,6 +24,8 @@ pub trait Source {
     /// The same at one point only: a field of one value.
     fn field_at(&mut self, name: &str, point: usize) -> Option<Field>;
     fn balance(&mut self) -> Balance;
+    /// By how much what is kept is off, and what that is measured against.
+    fn defect(&mut self, balance: &Balance) -> [f64; 2];
     /// The books as columns of the history.
     fn columns(&mut self, balance: &Balance) -> Vec<Column>;
     fn broken_pairs(&self) -> u64;

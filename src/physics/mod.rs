@@ -80,6 +80,10 @@ pub trait Physics: Send {
     fn dissipation(&mut self) -> Option<f64> {
         None
     }
+    /// By how much what is kept is off, and what that is measured against: of motion the energy, J.
+    fn defect(&self, balance: &Balance) -> [f64; 2] {
+        [balance.defect(), balance.scale()]
+    }
     /// The books as columns of a history.
     fn columns(&self, balance: &Balance) -> Vec<Column>;
     /// The first point, in point order, whose value, rate or velocity is not finite: name of the field, value, point.

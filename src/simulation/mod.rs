@@ -219,6 +219,7 @@ impl Simulation {
     fn report(&mut self, status: &str, wall: WallSeconds) -> Report {
         let facts = self.model.facts().clone();
         let b = self.history.balance;
+        let books = self.model.columns(&b).into_iter().map(|column| (column.name, column.value.into())).collect();
         let damage = self.model.field("damage").map_or(Vec::new(), |f| crate::output::source::scalar(f, None));
         let bonds = facts.bonds - facts.cut_bonds;
         Report {
@@ -266,6 +267,7 @@ impl Simulation {
                 families_found_anew: adapted.bonds[0] as f64 / (adapted.bonds[1] as f64).max(1.0),
                 points_seen_by_coarser: adapted.seen,
             }),
+            books,
             energy_imbalance: self.history.imbalance(),
             momentum_error: self.history.momentum_error(),
             broken_bonds: self.model.broken_pairs(),
@@ -367,6 +369,9 @@ mod tests {
         }
         fn balance(&mut self) -> Balance {
             Balance::default()
+        }
+        fn defect(&mut self, balance: &Balance) -> [f64; 2] {
+            [balance.defect(), balance.scale()]
         }
         fn columns(&mut self, _: &Balance) -> Vec<Column> {
             vec![Column::new("kinetic", 0.0)]

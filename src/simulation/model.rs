@@ -73,6 +73,9 @@ impl Source for Model {
     fn balance(&mut self) -> Balance {
         self.problem.balance()
     }
+    fn defect(&mut self, balance: &Balance) -> [f64; 2] {
+        self.problem.physics.defect(balance)
+    }
     fn columns(&mut self, balance: &Balance) -> Vec<Column> {
         self.problem.physics.columns(balance)
     }

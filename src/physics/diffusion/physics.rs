@@ -102,6 +102,10 @@ impl<const D: usize> Physics for Diffusing<D> {
         Content { stored: 0.0, scale: super::mass(&body.cloud, exec, &sizes), angular_momentum: [0.0; 3] }
     }
 
+    fn defect(&self, b: &Balance) -> [f64; 2] {
+        [b.momentum_defect, b.momentum_scale]
+    }
+
     /// What is there, what came in, and what of it is missing over the size of what is there.
     fn columns(&self, b: &Balance) -> Vec<Column> {
         let missing = if b.momentum_scale > 0.0 { b.momentum_defect / b.momentum_scale } else { 0.0 };
