@@ -12,7 +12,6 @@
 //! The body is a cube; u* is prescribed in a layer around it as thick as the horizon and a cell.
 
 use super::bar::rate;
-use super::discrete::{discrete_moduli, lattice_points};
 use super::navier::directions;
 use super::{Measure, Outcome, Row, Study, simulation};
 use bondwise::discretization::quadrature::gauss_legendre;
@@ -20,6 +19,7 @@ use bondwise::discretization::{Influence, PartialVolume};
 use bondwise::error::{Error, Result};
 use bondwise::field::Values;
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
+use bondwise::physics::elasticity::discrete::{discrete_moduli, lattice_points};
 use bondwise::physics::elasticity::moduli::{Hypothesis, Stiffness, micromodulus};
 
 pub const STUDY: Study = Study {

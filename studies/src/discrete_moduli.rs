@@ -3,13 +3,13 @@
 //! A block of cells is strained uniformly and its energy density read at the middle; the bonds across a plane, with the
 //! weights that a run uses, are summed at the critical stretch. Both against the tables of the lattice sums.
 
-use super::discrete::{TABLE, discrete_moduli};
 use super::family_counts::block;
 use super::{Measure, Outcome, Row};
 use bondwise::discretization::{Influence, Operator, PartialVolume};
 use bondwise::error::Result;
 use bondwise::family::Families;
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
+use bondwise::physics::elasticity::discrete::{TABLE, discrete_moduli};
 use bondwise::physics::elasticity::laws::BondBasedLinear;
 use bondwise::physics::elasticity::moduli::{Hypothesis, critical_stretch, micromodulus};
 use bondwise::physics::elasticity::{Bonds, Elasticity};

@@ -11,11 +11,11 @@
 //! without a look at bonds. These count too much: near the tip some break that do not cross the crack, the more the finer
 //! the lattice.
 
-use super::discrete::discrete_moduli;
 use super::{Measure, Outcome, Row, Study, bundled_simulation};
 use bondwise::discretization::{Influence, PartialVolume};
 use bondwise::error::Result;
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
+use bondwise::physics::elasticity::discrete::discrete_moduli;
 use bondwise::physics::elasticity::moduli::Hypothesis;
 use bondwise::problem::Balance;
 use bondwise::simulation::Stepper;

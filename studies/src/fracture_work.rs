@@ -9,13 +9,13 @@
 //! energy of all bonds across a line, W, differs from G₀ at a finite spacing; the rest is that bonds pass the critical
 //! stretch within a step, not at its end.
 
-use super::discrete::discrete_moduli;
 use super::{Measure, Outcome, Row, simulation};
 use bondwise::discretization::{Influence, PartialVolume};
 use bondwise::error::Result;
 use bondwise::output::picture::{CloudView, Image, Picture, Sizes, draw};
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
 use bondwise::output::source::{Source, deformed, scalar};
+use bondwise::physics::elasticity::discrete::discrete_moduli;
 use bondwise::physics::elasticity::moduli::Hypothesis;
 
 const CASE: &str = include_str!("fracture_work.toml");

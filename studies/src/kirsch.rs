@@ -3,12 +3,12 @@
 //! Traction on two opposite edges, nothing held: the static solver has to leave rigid motion out by itself. The strain along
 //! the pull, beside the hole, from displacements of the two rows next to the axis.
 
-use super::discrete::discrete_moduli;
 use super::{Measure, Outcome, Row, Study, simulation};
 use bondwise::discretization::{Influence, PartialVolume};
 use bondwise::error::Result;
 use bondwise::field::Values;
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
+use bondwise::physics::elasticity::discrete::discrete_moduli;
 use bondwise::physics::elasticity::moduli::Hypothesis;
 
 pub const STUDY: Study = Study {

@@ -7,7 +7,6 @@ pub mod bar;
 mod constants;
 mod convergence;
 mod crack_branching;
-pub mod discrete;
 mod discrete_moduli;
 mod dispersion;
 mod double_cantilever;

@@ -4,13 +4,13 @@
 //! E is that of the lattice. The load is spread over layers of one horizon at both ends, and nothing is held. Errors are
 //! compared with δ S/V: as if at each face of the bar a layer of so much of a horizon had no stiffness, or twice of it.
 
-use super::discrete::discrete_moduli;
 use super::{Measure, Outcome, Row, Study, simulation};
 use bondwise::discretization::{BondWeighting, Influence, PartialVolume};
 use bondwise::error::Result;
 use bondwise::field::Values;
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
 use bondwise::output::source::scalar;
+use bondwise::physics::elasticity::discrete::discrete_moduli;
 use bondwise::physics::elasticity::moduli::Hypothesis;
 use bondwise::physics::elasticity::surface::SurfaceEffect;
 

@@ -11,9 +11,9 @@ use bondwise::family::{Body, Bond, BondLaw, Families};
 use bondwise::field::{components, components_mut};
 use bondwise::geometry::{Arrangement, Cloud, Shape};
 use bondwise::physics::elasticity::State;
+use bondwise::physics::elasticity::discrete::discrete_moduli;
 use bondwise::physics::elasticity::laws::{Law, LawVisitor};
 use bondwise::physics::elasticity::moduli::{Hypothesis, micromodulus};
-use bondwise_studies::discrete::discrete_moduli;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 

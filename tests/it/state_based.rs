@@ -14,13 +14,13 @@ use bondwise::execution::Packs;
 use bondwise::family::{Body, Families};
 use bondwise::field::{Mixed, Number, Single, Values, components, components_mut};
 use bondwise::geometry::{Arrangement, Cloud, Shape};
+use bondwise::physics::elasticity::discrete::discrete_moduli;
 use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
 use bondwise::physics::elasticity::linear_solid::{LinearSolid, Moduli, Stretch};
 use bondwise::physics::elasticity::moduli::{Hypothesis, Stiffness, micromodulus};
 use bondwise::physics::elasticity::{Bonds, State};
 use bondwise::physics::failure::CriticalStretch;
 use bondwise::simulation::Simulation;
-use bondwise_studies::discrete::discrete_moduli;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 

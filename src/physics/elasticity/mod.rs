@@ -5,6 +5,7 @@
 
 mod adapt;
 pub mod bonds;
+pub mod discrete;
 pub mod hybrid;
 mod kernels;
 pub mod laws;

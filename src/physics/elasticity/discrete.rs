@@ -7,9 +7,9 @@
 //! ratio of 1.03 means a body 3 % too stiff: waves run 1.5 % too fast, and a wave meets that
 //! difference as an interface where the scheme changes.
 
-use bondwise::discretization::influence::Influence;
-use bondwise::discretization::volume::PartialVolume;
-use bondwise::physics::elasticity::moduli::{Hypothesis, Stiffness, critical_stretch, micromodulus};
+use super::moduli::{Hypothesis, Stiffness, critical_stretch, micromodulus};
+use crate::discretization::influence::Influence;
+use crate::discretization::volume::PartialVolume;
 
 /// Constants of the standard scheme as ratios to those of the continuous body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,10 +24,10 @@ pub struct DiscreteModuli {
 
 /// Hypothesis, m, then C₁₁, C₁₂, W/G₀ with full volumes and the same with the ramp; constant
 /// influence.
-pub(super) type Tabulated = (Hypothesis, f64, [f64; 3], [f64; 3]);
+pub type Tabulated = (Hypothesis, f64, [f64; 3], [f64; 3]);
 
 /// Own numbers from an independent script, to the four digits kept; 1e-4 is their last digit.
-pub(super) const TABLE: [Tabulated; 8] = [
+pub const TABLE: [Tabulated; 8] = [
     (Hypothesis::PlaneStress, 2.0, [1.1800, 0.6752, 0.9786], [1.1172, 1.0359, 1.1712]),
     (Hypothesis::PlaneStress, 3.0, [1.0528, 1.0051, 1.0261], [1.0327, 0.9825, 1.0342]),
     (Hypothesis::PlaneStress, 4.0, [0.9743, 0.9266, 0.9290], [1.0158, 1.0037, 1.0210]),
@@ -91,7 +91,7 @@ fn lattice_moduli<const D: usize>(
 }
 
 /// Points of the unit lattice with β > 0 about a source at the origin, as (ξ, β).
-pub(super) fn lattice_points<const D: usize>(rule: PartialVolume, m: f64) -> impl Iterator<Item = ([f64; D], f64)> {
+pub fn lattice_points<const D: usize>(rule: PartialVolume, m: f64) -> impl Iterator<Item = ([f64; D], f64)> {
     let range = rule.reach::<D>(1.0, m).ceil() as i64;
     let side = 2 * range + 1;
     (0..side.pow(D as u32)).filter_map(move |index| {
