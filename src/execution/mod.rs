@@ -289,6 +289,7 @@ impl Exec {
         let n = body.cloud.n_slots();
         assert!(input.iter().chain(&added).all(|f| f.len() == n), "input fields have the length of the cloud");
         assert!(output.iter().all(|f| f.len() == n), "output fields have the length of the cloud");
+        assert!(!K::MEMORY || !memory.numbers.0.is_null(), "a kernel with memory is given it");
         let output = output.map(|f| SharedSlice(f.as_mut_ptr()));
         let instructions = self.instructions;
         match &body.families {

@@ -362,6 +362,11 @@ impl Equilibrium for StaticSystem<'_> {
         for term in self.terms.iter_mut() {
             term.force(t, &mut self.load, self.n);
         }
+        // Force densities so far: their sum times the volume of the point.
+        let points = self.body.points();
+        for (k, load) in self.load.iter_mut().enumerate().filter(|(_, load)| **load != 0.0) {
+            *load *= points.volume(k % self.n);
+        }
         self.classify(t);
         let mut way = vec![0.0; self.displacement.len()];
         for constraint in self.constraints.iter_mut().filter(|constraint| constraint.holds(t)) {

@@ -110,6 +110,12 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
 
     /// W = ½ Σ w β V′; eq. (9).
     fn energy_density(&self, on: &mut On<'_, D>, states: &BondStates, u: [&[P::Field]; D], density: &mut [P::Field]) {
+        if L::MEMORY {
+            // A copy: to look at the energy is not to go there.
+            let rule = (&Unbreakable, false);
+            self.clone().remember(on, &mut states.clone(), u, [density], &Energy(self.law), rule);
+            return;
+        }
         on.exec.sum_bonds::<D, D, 1, P>(on.body, &on.operator.weights, states, u, [density], &Energy(self.law));
     }
 
@@ -133,7 +139,11 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
         u: [&[f64]; D],
     ) -> Option<Vec<BlockRow<D>>> {
         let law = self.law;
-        Some(Exec::blocks(body, weights, states, u, |bond, eta| law.stiffness(bond, eta)))
+        let stiffness = |bit: usize, bond: &Bond<D, f64>, eta: &[f64; D]| {
+            let memory = self.memory.get(bit).map_or(0.0, |memory| memory.to_f64());
+            law.stiffness(&Bond { memory, ..*bond }, eta)
+        };
+        Some(Exec::blocks(body, weights, states, u, stiffness))
     }
 
     fn break_beyond(

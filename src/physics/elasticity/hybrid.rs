@@ -176,14 +176,16 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
     /// state-based solid.
     fn last_rows(&mut self, on: &mut On<'_, D>, state: &mut State<P>) {
         let limits = &Limits::NONE;
+        if self.dilatation.is_some() {
+            self.dilate(on, state, true);
+        }
+        let tau = self.tau_of_bonds();
+        let (inner, damped) = (&mut self.inner, &mut self.damped_displacement);
+        with_damped_displacement(damped, tau, state, |state| inner.second_pass(on, state));
         if self.dilatation.is_none() {
             self.rows(on, state, &self.regions.mixed, limits);
             return;
         }
-        self.dilate(on, state, true);
-        let tau = self.tau_of_bonds();
-        let (inner, damped) = (&mut self.inner, &mut self.damped_displacement);
-        with_damped_displacement(damped, tau, state, |state| inner.second_pass(on, state));
         self.rows(on, state, &self.regions.collocated, limits);
         let (Some(dilatation), Some(p)) = (&self.dilatation, self.inner.dilatation_force()) else { return };
         let slope = (&dilatation.slope, dilatation.scales[1]);

@@ -42,7 +42,7 @@ impl EngineBar {
         let operator = scaling.operator(&body, update, old, None);
         let states = BondStates::whole(&body);
         let rest = vec![0.0; body.cloud.n_slots()];
-        let stiffness = |bond: &Bond<1, f64>, eta: &[f64; 1]| BondBasedLinear.stiffness(bond, eta);
+        let stiffness = |_, bond: &Bond<1, f64>, eta: &[f64; 1]| BondBasedLinear.stiffness(bond, eta);
         let blocks = Exec::blocks(&body, &operator.weights, &states, [&rest], stiffness);
         let rows: Vec<Vec<(u32, f64)>> =
             blocks.into_iter().map(|row| row.into_iter().map(|(p, [[k]])| (p, k)).collect()).collect();
