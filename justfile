@@ -3,6 +3,10 @@
 check:
     bash .ci/run
 
+# The gate, and what takes long.
+check-full:
+    bash .ci/full
+
 test:
     cargo test --workspace
 
