@@ -10,7 +10,7 @@
 //!
 //! equal to the integral for every polynomial up to the order. Shojaei et al. 2022, eqs. (32)-(60).
 //!
-//! Whether a row may be marched in time is known before the first step from its [`symbol`]; [`gate`] refuses those that may not.
+//! Whether a row may be marched in time is known before the first step from its [`symbol`]; [`stability`] refuses those that may not.
 //!
 //! Deliberately absent: incomplete balls, for which the closed forms do not hold, and which points have rows.
 
