@@ -78,8 +78,7 @@ fn on_these_threads(args: &BenchArgs) -> Result<Vec<Row>> {
         // The plate has one size.
         let sizes = if problem.body == Body::Plate { &args.size[..1] } else { &args.size };
         for &size in sizes {
-            // A state-based solid is of double precision.
-            for precision in args.precision.iter().filter(|p| !problem.solid || *p == "double") {
+            for precision in &args.precision {
                 let row = measure(problem, size, precision, args.steps, limits)?;
                 if !args.json {
                     say!("{}", row.line());
