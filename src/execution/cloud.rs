@@ -310,16 +310,25 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         let length = square * inverse;
         let weight = self.weigh::<V, PLAIN>(first, length, volume);
         let (spring, moment, memory) = (weight * inverse, weight * length, V::splat(0.0));
+        const { assert!(I <= 4 && I + A <= 8, "values of a point stand in two records, differences in the first") };
         let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring, moment, memory };
         let (mut relative, mut added) = ([V::splat(0.0); I], [V::splat(0.0); A]);
-        for part in 0..(I + A).div_ceil(4) {
-            let there = unsafe { V::gather(self.input.as_ptr().add(part * self.n_points()), index) };
-            for c in 4 * part..(I + A).min(4 * part + 4) {
-                if c < I {
-                    relative[c] = V::relative(there[c - 4 * part], here.input[c], mask);
-                } else {
-                    added[c - I] = V::relative(there[c - 4 * part], here.added[c - I], mask);
-                }
+        // Two records at most, written out: a loop over them would go through memory.
+        if I + A > 0 {
+            // SAFETY: `gather_input` has made a record for each point, and `index` names points.
+            let there = unsafe { V::gather(self.input.as_ptr(), index) };
+            for c in 0..I.min(4) {
+                relative[c] = V::relative(there[c], here.input[c], mask);
+            }
+            for c in I..(I + A).min(4) {
+                added[c - I] = V::relative(there[c], here.added[c - I], mask);
+            }
+        }
+        if I + A > 4 {
+            // SAFETY: as above, for the second record of each.
+            let there = unsafe { V::gather(self.input.as_ptr().add(self.n_points()), index) };
+            for c in 4.max(I)..I + A {
+                added[c - I] = V::relative(there[c - 4], here.added[c - I], mask);
             }
         }
         (bond, relative, added)
