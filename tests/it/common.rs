@@ -6,9 +6,12 @@ use bondwise::discretization::Operator;
 use bondwise::execution::Packs;
 use bondwise::family::Body;
 use bondwise::field::Double;
+use bondwise::geometry::{Cloud, Shape};
 use bondwise::physics::Physics;
 use bondwise::physics::elasticity::{Elasticity, Material, State};
 use bondwise::physics::failure::CriticalStretch;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// An elastic body whose states the test keeps itself.
 pub struct Held<const D: usize, P: Packs = Double>(pub Mutex<Elasticity<D, P>>);
@@ -50,5 +53,40 @@ impl<const D: usize, P: Packs> Held<D, P> {
 
     pub fn stable_step(&self) -> f64 {
         self.0.lock().unwrap().stable_step()
+    }
+}
+
+/// Distance between the points of these bodies.
+pub const SPACING: f64 = 1e-3;
+
+/// A box of cells that is not centred on the origin, so that positions are rounded.
+pub fn lattice<const D: usize>(counts: [usize; 3]) -> Cloud<D> {
+    let low = std::array::from_fn(|d| SPACING * [0.3, -4.1, 0.7][d]);
+    let high = std::array::from_fn(|d| low[d] + SPACING * counts[d] as f64);
+    Cloud::lattice(&Shape::Box { low, high }, SPACING, 5)
+}
+
+/// The same points moved by up to 0.2 spacings, with volumes that differ.
+pub fn perturbed<const D: usize>(counts: [usize; 3]) -> Cloud<D> {
+    let cloud = lattice::<D>(counts);
+    let mut random = Random::new(1);
+    let positions =
+        cloud.slots.iter().map(|&s| cloud.position(s as usize).map(|x| x + 0.2 * SPACING * random.next())).collect();
+    let volumes = cloud.slots.iter().map(|_| SPACING.powi(D as i32) * (1.0 + 0.3 * random.next())).collect();
+    Cloud::scattered(positions, volumes)
+}
+
+/// Numbers between −1 and 1.
+pub struct Random(ChaCha8Rng);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Random(ChaCha8Rng::seed_from_u64(seed))
+    }
+    pub fn next(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+    pub fn vector<const D: usize>(&mut self, size: f64) -> [f64; D] {
+        std::array::from_fn(|_| size * self.next())
     }
 }

@@ -5,7 +5,7 @@
 //! error ε of displacements changes no force density by more than 2 K ε, and displacements u of a body of size X are
 //! known to ε = 2⁻⁵³ (|u| + X |∇u|), the second part because positions are rounded too.
 
-use crate::common::Held;
+use crate::common::{Held, Random, SPACING, lattice, perturbed};
 use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
 use bondwise::family::{Body, Bond, BondLaw, Families};
 use bondwise::field::{components, components_mut};
@@ -14,12 +14,9 @@ use bondwise::physics::elasticity::State;
 use bondwise::physics::elasticity::discrete::discrete_moduli;
 use bondwise::physics::elasticity::laws::{Law, LawVisitor};
 use bondwise::physics::elasticity::moduli::{Hypothesis, micromodulus};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 
 const YOUNG: f64 = 72e9;
 const DENSITY: f64 = 2440.0;
-const SPACING: f64 = 1e-3;
 /// 2⁻⁵³
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
@@ -150,35 +147,6 @@ fn one_dimension<const D: usize>(counts: [usize; 3], ratio: f64, bodies: Bodies,
                 }
             }
         }
-    }
-}
-
-/// A box of cells that is not centred on the origin, so that positions are rounded.
-fn lattice<const D: usize>(counts: [usize; 3]) -> Cloud<D> {
-    let low = std::array::from_fn(|d| SPACING * [0.3, -4.1, 0.7][d]);
-    let high = std::array::from_fn(|d| low[d] + SPACING * counts[d] as f64);
-    Cloud::lattice(&Shape::Box { low, high }, SPACING, 5)
-}
-
-/// The same points moved by up to 0.2 spacings, with volumes that differ.
-fn perturbed<const D: usize>(counts: [usize; 3]) -> Cloud<D> {
-    let cloud = lattice::<D>(counts);
-    let mut random = Random::new(1);
-    let positions =
-        cloud.slots.iter().map(|&s| cloud.position(s as usize).map(|x| x + 0.2 * SPACING * random.next())).collect();
-    let volumes = cloud.slots.iter().map(|_| SPACING.powi(D as i32) * (1.0 + 0.3 * random.next())).collect();
-    Cloud::scattered(positions, volumes)
-}
-
-/// Numbers between −1 and 1.
-struct Random(ChaCha8Rng);
-
-impl Random {
-    fn new(seed: u64) -> Self {
-        Random(ChaCha8Rng::seed_from_u64(seed))
-    }
-    fn next(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 }
 

@@ -5,7 +5,7 @@
 //! Tolerances as in `patch.rs`: K = λ/2 stands for the spring constant of all bonds of a point, with λ the bound behind
 //! the stable step.
 
-use crate::common::Held;
+use crate::common::{Held, Random, SPACING, lattice, perturbed};
 use bondwise::case::build::{Options, build};
 use bondwise::case::model::Case;
 use bondwise::case::read_text;
@@ -13,7 +13,7 @@ use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
 use bondwise::execution::Packs;
 use bondwise::family::{Body, Families};
 use bondwise::field::{Mixed, Number, Single, Values, components, components_mut};
-use bondwise::geometry::{Arrangement, Cloud, Shape};
+use bondwise::geometry::{Arrangement, Cloud};
 use bondwise::physics::elasticity::discrete::discrete_moduli;
 use bondwise::physics::elasticity::laws::{BondBased, BondBasedLinear};
 use bondwise::physics::elasticity::linear_solid::{LinearSolid, Moduli, Stretch};
@@ -21,12 +21,9 @@ use bondwise::physics::elasticity::moduli::{Hypothesis, Stiffness, micromodulus}
 use bondwise::physics::elasticity::{Bonds, State};
 use bondwise::physics::failure::CriticalStretch;
 use bondwise::simulation::Simulation;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 
 const YOUNG: f64 = 72e9;
 const DENSITY: f64 = 2440.0;
-const SPACING: f64 = 1e-3;
 /// 2⁻⁵³
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 /// Below, at and above the ratios of bonds, and nearly incompressible.
@@ -206,37 +203,6 @@ fn one_dimension<const D: usize>(
                 }
             }
         }
-    }
-}
-
-fn lattice<const D: usize>(counts: [usize; 3]) -> Cloud<D> {
-    let low = std::array::from_fn(|d| SPACING * [0.3, -4.1, 0.7][d]);
-    let high = std::array::from_fn(|d| low[d] + SPACING * counts[d] as f64);
-    Cloud::lattice(&Shape::Box { low, high }, SPACING, 5)
-}
-
-/// The same points moved by up to 0.2 spacings, with volumes that differ.
-fn perturbed<const D: usize>(counts: [usize; 3]) -> Cloud<D> {
-    let cloud = lattice::<D>(counts);
-    let mut random = Random::new(1);
-    let positions =
-        cloud.slots.iter().map(|&s| cloud.position(s as usize).map(|x| x + 0.2 * SPACING * random.next())).collect();
-    let volumes = cloud.slots.iter().map(|_| SPACING.powi(D as i32) * (1.0 + 0.3 * random.next())).collect();
-    Cloud::scattered(positions, volumes)
-}
-
-/// Numbers between −1 and 1.
-struct Random(ChaCha8Rng);
-
-impl Random {
-    fn new(seed: u64) -> Self {
-        Random(ChaCha8Rng::seed_from_u64(seed))
-    }
-    fn next(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-    fn vector<const D: usize>(&mut self, size: f64) -> [f64; D] {
-        std::array::from_fn(|_| size * self.next())
     }
 }
 
