@@ -5,14 +5,23 @@
 //! fields by name. Names exist for output only.
 
 use std::fmt::Debug;
-use std::ops::{Add, Mul};
+use std::ops::{Add, Div, Mul};
 
 use crate::unknown::{Numbers, Vectors};
 use crate::visit::Visitor;
 
 /// A number that a field is stored in, or that the arithmetic along a bond is done in: `f64` or `f32`.
 pub trait Number:
-    Copy + Default + PartialOrd + Debug + Send + Sync + Add<Output = Self> + Mul<Output = Self> + 'static
+    Copy
+    + Default
+    + PartialOrd
+    + Debug
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + 'static
 {
     fn from_f64(x: f64) -> Self;
     fn to_f64(self) -> f64;

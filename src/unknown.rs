@@ -1,6 +1,8 @@
 //! The vectors that solvers advance, in whichever numbers they are stored: asked for once a pass, so that neither a solver
 //! nor a condition has the numbers among its types.
 
+use crate::field::Number;
+
 /// The vectors of a body: ρ ü = rate − ρ c u̇, or ρ u̇ = rate where there is no velocity. All are flat, component after
 /// component.
 pub struct Vectors<'a, T> {
@@ -12,6 +14,8 @@ pub struct Vectors<'a, T> {
     pub rate: &'a mut [T],
     /// τ (s) and where u + τ v is wanted after a drift, if it is.
     pub damped: Option<(f64, &'a mut [T])>,
+    /// ρ over the inertia of the unknown, by place in a component; None where that is the inertia of all.
+    pub relative_inertia: Option<&'a [T]>,
 }
 
 /// The same in the numbers that they are stored in, and what solvers need to know of them.
@@ -19,7 +23,7 @@ pub struct Unknown<'a> {
     pub vectors: Numbers<'a>,
     /// Components of a value.
     pub components: usize,
-    /// ρ; 1 where values are what changes.
+    /// ρ; 1 where values are what changes. Where it differs from place to place, what that is a multiple of.
     pub inertia: f64,
     /// Values below this count as zero. Ahead of a wave they fall off without end, and processors are slow with numbers
     /// near the smallest that they know.
@@ -60,6 +64,14 @@ pub struct Component<'a, T> {
     /// Empty of an equation of first order.
     pub velocity: &'a mut [T],
     pub rate: &'a mut [T],
+    pub relative_inertia: Option<&'a [T]>,
+}
+
+impl<T: Number> Component<'_, T> {
+    /// ρ at a place, of an unknown with this inertia.
+    pub fn inertia(&self, unit: f64, slot: usize) -> f64 {
+        self.relative_inertia.map_or(unit, |relative| unit * relative[slot].to_f64())
+    }
 }
 
 impl<T> Vectors<'_, T> {
@@ -69,6 +81,6 @@ impl<T> Vectors<'_, T> {
             let size = flat.len() / n;
             &mut flat[c * size..(c + 1) * size]
         });
-        Component { value, velocity, rate }
+        Component { value, velocity, rate, relative_inertia: self.relative_inertia }
     }
 }

@@ -129,7 +129,7 @@ fn on_body<const D: usize, L: Stretch<D> + 'static, P: Packs>(
     let failure = (what != What::Unbreakable).then(|| CriticalStretch::uniform(0.1));
     let solid = Moduli::new(Hypothesis::Solid, 1.0, 0.3);
     let material: Box<dyn Material<D, P>> = if what == What::TwoPasses {
-        Box::new(LinearSolid::new(law, solid, &body, &operator.weights))
+        Box::new(LinearSolid::new(law, &[solid], &body, &operator.weights))
     } else {
         Box::new(Bonds::new(law))
     };

@@ -34,7 +34,7 @@ use crate::physics::elasticity::laws::Law;
 use crate::physics::elasticity::linear_solid::Moduli;
 use crate::physics::elasticity::moduli::{self, Hypothesis};
 use crate::physics::elasticity::surface::{correction_by_energy, correction_by_volume, surface_effect};
-use crate::physics::elasticity::{Elasticity, On};
+use crate::physics::elasticity::{Density, Elasticity, On};
 use crate::physics::failure::CriticalStretch;
 use crate::problem::Problem;
 use crate::simulation::{Model, Simulation, SolverStage, Stepper};
@@ -158,7 +158,7 @@ impl<const D: usize> Builder<'_, D> {
             if adaptation.criteria.is_some() {
                 let operator = Operator::standard(&lattice, strength, influence, rule);
                 let mut on = On { body: &lattice, operator: &operator, failure: None, exec: &mut Exec::default() };
-                let step = self.law().bonds::<D, P>().stable_step(&mut on, parameters.density);
+                let step = self.law().bonds::<D, P>().stable_step(&mut on, &Density::same(parameters.density));
                 finest_step = step / f64::from(1u32 << adaptation.cells.levels);
             }
         }
@@ -215,7 +215,7 @@ impl<const D: usize> Builder<'_, D> {
             Scheme::Hybrid(settings) => Some(settings),
             Scheme::Standard => None,
         };
-        let material = self.law().material::<D, P>(&moduli, &body, &operator.weights);
+        let material = self.law().material::<D, P>(&[moduli], &body, &operator.weights);
         let mut elasticity = Elasticity::new(body, operator, material, parameters.density, failure);
         if settings.is_some_and(|settings| settings.rescale) {
             hybrid::rescale(&mut elasticity, &scaling);

@@ -196,6 +196,7 @@ impl Prescribed {
             let (slot, volume) = (slot as usize, self.volume.of(k));
             let [u, v, f] = [on.value[slot], on.velocity[slot], on.rate[slot]].map(T::to_f64);
             let mean = 0.5 * (f + *f_last);
+            let inertia = on.inertia(inertia, slot);
             let damped = 0.5 * inertia * damping * dt;
             booked.impulse += (inertia * (v - *v_last) + damped * (v + *v_last) - mean * dt) * volume;
             let kinetic = 0.5 * inertia * (v * v - *v_last * *v_last);
@@ -260,6 +261,7 @@ impl Prescribed {
         for (k, ((&slot, u_last), v_last)) in self.slots.iter().zip(us).zip(vs).enumerate() {
             let (slot, volume) = (slot as usize, self.volume.of(k));
             let [u, v] = [on.value[slot], on.velocity[slot]].map(T::to_f64);
+            let inertia = on.inertia(inertia, slot);
             booked.impulse += inertia * (v - *v_last) * volume;
             booked.work += 0.5 * inertia * (v * v - *v_last * *v_last) * volume;
             (*u_last, *v_last) = (u, v);
@@ -276,7 +278,7 @@ impl Prescribed {
         for (k, &slot) in self.slots.iter().enumerate() {
             let slot = slot as usize;
             let [v, f] = [on.velocity[slot], on.rate[slot]].map(T::to_f64);
-            let impulse = weight * (inertia * at.damping * v - f) * self.volume.of(k);
+            let impulse = weight * (on.inertia(inertia, slot) * at.damping * v - f) * self.volume.of(k);
             booked.impulse += impulse;
             booked.work += impulse * v;
         }

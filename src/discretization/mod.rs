@@ -2,6 +2,7 @@
 
 pub mod collocation;
 pub mod graded;
+pub mod heterogeneity;
 pub mod hybrid;
 pub mod influence;
 pub mod moments;
@@ -12,6 +13,7 @@ pub mod volume;
 
 pub use collocation::Collocation;
 pub use graded::BondWeighting;
+pub use heterogeneity::Heterogeneity;
 pub use hybrid::Regions;
 pub use influence::Influence;
 pub use standard::{BondWeights, Operator};

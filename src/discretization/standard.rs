@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Influence, PartialVolume};
+use super::{Heterogeneity, Influence, PartialVolume};
 use crate::family::{Body, CloudFamilies, Families, GROUP, Offset};
 use crate::field::{Vector, difference, norm};
 use crate::geometry::lattice::BLOCK;
@@ -30,6 +30,8 @@ pub struct BondWeights {
     pub by_offset: Vec<f64>,
     /// By length, where each point has its own.
     pub by_length: CloudWeights,
+    /// What they are multiplied by, bond by bond; None in a body of one constant.
+    pub heterogeneity: Option<Arc<Heterogeneity>>,
 }
 
 /// The weight of a bond of a scattered cloud, from its length and the volume at its other end.
@@ -124,8 +126,8 @@ impl Operator {
         let volumes = CloudWeights { strength: 1.0, influence: Influence::Constant, ..weights.clone() };
         let [offset_weights, offset_volumes] = by_offset;
         Operator {
-            weights: BondWeights { by_offset: offset_weights, by_length: weights },
-            volumes: BondWeights { by_offset: offset_volumes, by_length: volumes },
+            weights: BondWeights { by_offset: offset_weights, by_length: weights, heterogeneity: None },
+            volumes: BondWeights { by_offset: offset_volumes, by_length: volumes, heterogeneity: None },
         }
     }
 
@@ -136,7 +138,8 @@ impl Operator {
             Fractions::Weights(w) => (2 + 8) * w.len(),
             Fractions::Full | Fractions::Ramp => 0,
         };
-        2 * size_of_val(&self.weights.by_offset[..]) + by_bond
+        let varied = self.weights.heterogeneity.as_ref().map_or(0, |varied| varied.memory());
+        2 * size_of_val(&self.weights.by_offset[..]) + by_bond + varied
     }
 
     /// The weights by bond, and the fractions of the volumes, where these are stored.
@@ -151,15 +154,16 @@ impl Operator {
 impl BondWeights {
     /// Of a cloud, by bond.
     pub(super) fn stored(by_length: CloudWeights) -> Self {
-        BondWeights { by_offset: Vec::new(), by_length }
+        BondWeights { by_offset: Vec::new(), by_length, heterogeneity: None }
     }
 
-    /// The weight of a bond of a body: bit number `bit` of its states, to the slot `there`, with ξ.
-    pub fn of<const D: usize>(&self, body: &Body<D>, bit: usize, there: usize, xi: &Vector<D>) -> f64 {
-        match &body.families {
+    /// The weight of a bond of a body: bit number `bit` of its states, between two slots, with ξ.
+    pub fn of<const D: usize>(&self, body: &Body<D>, bit: usize, [here, there]: [usize; 2], xi: &Vector<D>) -> f64 {
+        let alike = match &body.families {
             Families::Lattice(families) => self.by_offset[bit / BLOCK % families.offsets.len()],
             Families::Cloud(_) => self.by_length.weight(bit, norm(xi), body.cloud.volume(there)),
-        }
+        };
+        self.heterogeneity.as_ref().map_or(alike, |varied| alike * varied.factor(here, there))
     }
 }
 

@@ -23,7 +23,7 @@ impl Exec {
             let mut row = BlockRow::new();
             for (bit, there) in body.bonds_of(slot).filter(|(bit, _)| states.holds(*bit)) {
                 let xi = body.xi(bit, slot, there);
-                let bond = Bond::new(xi, norm(&xi), weights.of(body, bit, there, &xi));
+                let bond = Bond::new(xi, norm(&xi), weights.of(body, bit, [slot, there], &xi));
                 let relative = std::array::from_fn(|d| input[d][there] - input[d][slot]);
                 row.push((there as u32, block(bit, &bond, &relative)));
             }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::packs::{BondVectors, Instructions, LoadEnds, Pack, Packs, SiteView};
 use super::{BreakRule, Broken, Memory, SharedSlice, StatesPointer};
+use crate::discretization::Heterogeneity;
 use crate::discretization::standard::{CloudWeights, WeightPolynomial};
 use crate::family::{Bond, BondKernel, CloudFamilies, GROUP};
 use crate::field::Number;
@@ -47,6 +48,7 @@ pub struct Sum<'a, const D: usize, const I: usize, const A: usize, const O: usiz
     pub instructions: Instructions,
     pub families: &'a CloudFamilies,
     pub weights: &'a CloudWeights,
+    pub heterogeneity: Option<&'a Heterogeneity>,
     pub profile: WeightPolynomial<'a>,
     pub sites: SiteView<'a, P::Site>,
     pub states: StatesPointer,
@@ -89,7 +91,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     /// As of [`Sum::sum`].
     unsafe fn small(&self, point: usize) -> f64 {
         unsafe {
-            if K::EVERY_STEP && self.profile.plain {
+            if K::EVERY_STEP && self.profile.plain && self.heterogeneity.is_none() {
                 self.sum::<true, true>(point)
             } else {
                 self.sum::<true, false>(point)
@@ -211,13 +213,34 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         self.states.0
     }
 
-    /// The weights of consecutive bonds, from their lengths and the volumes at their other ends.
+    /// The weights of consecutive bonds of a point, from their lengths and the volumes at their other ends.
     #[inline(always)]
-    fn weigh<V: Pack<P::Bond>, const PLAIN: bool>(&self, first: usize, length: V, volume: V) -> V {
-        let profile = &self.profile;
+    fn weigh<V: Pack<P::Bond>, const PLAIN: bool>(&self, point: usize, first: usize, length: V, volume: V) -> V {
         if PLAIN {
-            return volume * V::splat(profile.influence[0]);
+            return volume * V::splat(self.profile.influence[0]);
         }
+        let weight = self.weigh_alike(first, length, volume);
+        match self.heterogeneity {
+            None => weight,
+            Some(varied) => weight * self.factors(varied, point, first),
+        }
+    }
+
+    /// What the weights of consecutive bonds of a point are multiplied by where materials differ.
+    #[inline(never)]
+    fn factors<V: Pack<P::Bond>>(&self, varied: &Heterogeneity, point: usize, first: usize) -> V {
+        let mut factors = [P::Bond::default(); GROUP];
+        for (factor, &there) in factors[..V::LANES].iter_mut().zip(&self.families.neighbours[first..]) {
+            *factor = P::Bond::from_f64(varied.factor(point, there as usize));
+        }
+        // SAFETY: a pack has at most `GROUP` lanes.
+        unsafe { V::load(factors.as_ptr()) }
+    }
+
+    /// The weights of bonds of one material.
+    #[inline(always)]
+    fn weigh_alike<V: Pack<P::Bond>>(&self, first: usize, length: V, volume: V) -> V {
+        let profile = &self.profile;
         if let Some((stored, unit)) = profile.stored {
             let mut weights = [P::Bond::default(); GROUP];
             for (weight, stored) in weights[..V::LANES].iter_mut().zip(&stored[first..]) {
@@ -308,7 +331,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         }
         let inverse = square.inverse_root();
         let length = square * inverse;
-        let weight = self.weigh::<V, PLAIN>(first, length, volume);
+        let weight = self.weigh::<V, PLAIN>(point, first, length, volume);
         let (spring, moment, memory) = (weight * inverse, weight * length, V::splat(0.0));
         const { assert!(I <= 4 && I + A <= 8, "values of a point stand in two records, differences in the first") };
         let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring, moment, memory };

@@ -58,6 +58,8 @@ struct Sum<'a, const D: usize, P: Packs> {
     pairs: Vec<BondPair<D, P::Bond>>,
     slopes: Vec<BondSlope<D, P::Bond>>,
     classes: &'a [RowClass],
+    /// d of the row's heterogeneity by slot; empty without one.
+    compliance: &'a [P::Bond],
     input: [SharedSlice<P::Field>; D],
     /// What slopes take the gradient of.
     scalar: SharedSlice<P::Field>,
@@ -163,6 +165,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
             pairs: Vec::new(),
             slopes: Vec::new(),
             classes: &[],
+            compliance: &[],
             input,
             scalar: SharedSlice(std::ptr::null_mut()),
             output,
@@ -177,7 +180,12 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
     fn of(self, row: &'a SharedRow<D>) -> Self {
         let pair =
             |pair: &Pair<D>| BondPair { shift: pair.shift, weight: pair.weight.map(|w| w.map(P::Bond::from_f64)) };
-        Sum { pairs: row.pairs.iter().map(pair).collect(), classes: &row.classes, ..self }
+        let compliance = row.heterogeneity.as_ref().map_or(&[][..], |varied| {
+            let (double, single) = varied.compliance();
+            P::Bond::choose(double, single)
+        });
+        assert!(compliance.is_empty() || compliance.len() == self.lattice.n_slots, "a number for each slot");
+        Sum { pairs: row.pairs.iter().map(pair).collect(), classes: &row.classes, compliance, ..self }
     }
 
     /// Does something with the first slot of each block; gives the slots whose bits it returns.
@@ -251,7 +259,7 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
                 }
                 beyond |= self.beyond::<V>(first, &here, mask) << (part * V::LANES);
                 for o in 0..D {
-                    self.store(total[o] + across[o], o, first, mask);
+                    self.store(self.scaled(total[o] + across[o], first), o, first, mask);
                 }
             }
         }
@@ -403,9 +411,19 @@ impl<'a, const D: usize, P: Packs> Sum<'a, D, P> {
                         sum = sum + (after[o] * there + before[o] * back);
                     }
                 }
-                self.store(V::splat(0.25) * sum, 0, first, keep >> (part * V::LANES));
+                self.store(self.scaled(V::splat(0.25) * sum, first), 0, first, keep >> (part * V::LANES));
             }
         }
+    }
+
+    /// What a row gives, in the constant of each point.
+    #[inline(always)]
+    fn scaled<V: Pack<P::Bond>>(&self, value: V, first: usize) -> V {
+        if self.compliance.is_empty() {
+            return value;
+        }
+        // SAFETY: there is a number for each slot.
+        value * (V::splat(0.5) / unsafe { V::load(self.compliance.as_ptr().add(first)) })
     }
 
     #[inline(always)]

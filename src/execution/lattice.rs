@@ -8,7 +8,8 @@
 
 use super::packs::{Instructions, LoadEnds, Pack, Packs};
 use super::{BreakRule, Broken, Memory, SharedSlice, StatesPointer};
-use crate::family::{Bond, BondKernel, LatticeFamilies};
+use crate::discretization::{BondWeights, Heterogeneity};
+use crate::family::{Bond, BondKernel, LatticeFamilies, Offset};
 use crate::field::{Number, Precision};
 use crate::geometry::Lattice;
 use crate::geometry::lattice::BLOCK;
@@ -17,12 +18,19 @@ use crate::lane::Lane;
 /// Blocks in a chunk: the unit that threads share out, and of the ordered sums. Fixed, whatever the threads.
 const CHUNK: usize = 64;
 
+/// In the place of the first row of a block: each bond has its own weight.
+const MIXED: usize = usize::MAX;
+
 /// What the loop reads of a body.
 pub struct View<'a, const D: usize, B> {
     lattice: &'a Lattice<D>,
     pub families: &'a LatticeFamilies<D>,
     pub weights: &'a [f64],
+    pub heterogeneity: Option<&'a Heterogeneity>,
+    /// d of [`Heterogeneity`] by slot, if there is one.
+    compliance: &'a [B],
     blocks: &'a [u32],
+    /// Of all offsets, once for each level of the heterogeneity; of the weights themselves if there is none.
     rows: Vec<Row<D, B>>,
 }
 
@@ -39,9 +47,11 @@ struct Row<const D: usize, B> {
 
 impl<'a, const D: usize, B: Number> View<'a, D, B> {
     /// Over all blocks of the families, or over those in `within`.
-    pub fn new(families: &'a LatticeFamilies<D>, weights: &'a [f64], within: Option<&'a [u32]>) -> Self {
+    pub fn new(families: &'a LatticeFamilies<D>, weights: &'a BondWeights, within: Option<&'a [u32]>) -> Self {
+        let heterogeneity = weights.heterogeneity.as_deref();
+        let weights = &weights.by_offset[..];
         assert_eq!(weights.len(), families.offsets.len(), "one weight an offset");
-        let rows = families.offsets.iter().zip(weights).map(|(offset, &weight)| {
+        let row = |(offset, weight): (&Offset<D>, f64)| {
             let Bond { xi, length, inverse_square, weight, spring, moment, .. } =
                 Bond::new(offset.xi, offset.length, weight);
             Row {
@@ -53,14 +63,30 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
                 spring: B::from_f64(spring),
                 moment: B::from_f64(moment),
             }
+        };
+        // Mixed blocks begin with the first row, and need one of the weights themselves.
+        let levels = heterogeneity.map_or(&[][..], Heterogeneity::levels);
+        let factors = std::iter::once(&1.0).chain(levels);
+        let all = factors.flat_map(|factor| families.offsets.iter().zip(weights.iter().map(move |w| w * factor)));
+        let compliance = heterogeneity.map_or(&[][..], |varied| {
+            let (double, single) = varied.compliance();
+            B::choose(double, single)
         });
         View {
             lattice: &families.lattice,
             families,
             weights,
+            heterogeneity,
+            compliance,
             blocks: within.unwrap_or(&families.blocks),
-            rows: rows.collect(),
+            rows: all.map(row).collect(),
         }
+    }
+
+    /// The first row of the bonds of a block: None where they differ from point to point.
+    #[inline(always)]
+    pub fn level(&self, block: u32) -> Option<usize> {
+        self.heterogeneity.map_or(Some(0), |varied| varied.level(block).map(|level| level + 1))
     }
 
     pub fn n_chunks(&self) -> usize {
@@ -105,40 +131,64 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             // `Exec::pass` has checked; the words of a block and its slots belong to this chunk alone.
             unsafe {
                 let words = std::slice::from_raw_parts_mut(words.add(block as usize * n), n);
-                let mut largest = self.sum::<true>(words, slot);
+                let level = self.view.level(block);
+                let mut largest = self.bonds::<true>(words, slot, level);
                 if !R::NEVER && largest > threshold {
                     let here = self.break_bonds(words, slot, rule);
                     if here.bonds > 0 {
                         broken.bonds += here.bonds;
                         broken.energy += here.energy;
-                        largest = self.sum::<true>(words, slot);
+                        largest = self.bonds::<true>(words, slot, level);
                     }
                 }
                 if K::TWO_FORMS && largest > K::SMALL {
-                    self.sum::<false>(words, slot);
+                    self.bonds::<false>(words, slot, level);
                 }
             }
         }
         broken
     }
 
-    compiled!(sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP, [with SMALL: bool], (words: &[u16], slot: usize), f64);
+    /// Sums one block whose bonds have the weights of a level, or each its own. What is summed in every step is compiled for
+    /// both apart.
+    ///
+    /// # Safety
+    /// As of `sum_on`; `level` is what [`View::level`] says of the block.
+    pub unsafe fn bonds<const SMALL: bool>(&self, words: &[u16], slot: usize, level: Option<usize>) -> f64 {
+        let rows = level.map_or(MIXED, |level| level * self.view.families.offsets.len());
+        unsafe {
+            if !K::EVERY_STEP || (K::VARIED && rows == MIXED) {
+                self.sum::<SMALL, true>(words, slot, rows)
+            } else {
+                self.sum::<SMALL, false>(words, slot, rows)
+            }
+        }
+    }
+
+    compiled!(
+        sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP && !VARIED,
+        [with SMALL: bool, VARIED: bool], (words: &[u16], slot: usize, rows: usize), f64
+    );
     compiled!(
         break_bonds, break_on, break_avx2, break_avx512 if false,
         [rule R: BreakRule<D>], (words: &mut [u16], slot: usize, rule: &R), Broken
     );
 
     /// Sums one block into the output, in the small or the exact form; returns the largest |strain| of its whole bonds.
+    /// `rows`: the first of the rows of its bonds; if these may be `VARIED`, [`MIXED`] says that they are.
     ///
     /// Mirror images of an offset stand in sequences of their own, which are added as a balanced tree: a mirrored body
     /// has mirrored bits.
     #[inline(always)]
-    unsafe fn sum_on<V: Pack<P::Bond> + LoadEnds<P::Field>, const SMALL: bool>(
+    unsafe fn sum_on<V: Pack<P::Bond> + LoadEnds<P::Field>, const SMALL: bool, const VARIED: bool>(
         &self,
         words: &[u16],
         slot: usize,
+        rows: usize,
     ) -> f64 {
         let mut watch = V::splat(0.0);
+        let mixed = VARIED && rows == MIXED;
+        let rows = if mixed { 0 } else { rows };
         for part in 0..BLOCK / V::LANES {
             let first = slot + part * V::LANES;
             // SAFETY: the slots of a block are inside the input.
@@ -153,7 +203,10 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                     for _ in 0..class.members {
                         // SAFETY: classes are ranges of offsets, and words and rows have one entry an offset.
                         unsafe {
-                            let mut bond = self.bond::<V>(k);
+                            let mut bond = self.bond::<V>(rows + k);
+                            if mixed {
+                                bond = self.varied(bond, k, first);
+                            }
                             let mask = *words.get_unchecked(k) >> (part * V::LANES);
                             let relative = self.relative::<V, I>(&self.input, k, first, &here, mask);
                             let added = self.relative::<V, A>(&self.added, k, first, &own, mask);
@@ -232,7 +285,8 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                     if *word & bit != 0 && strain > threshold && rule.breaks(here, there, strain) {
                         *word &= !bit;
                         broken.bonds += 1;
-                        let mut bond = Bond::new(offset.xi, offset.length, self.view.weights[k]);
+                        let varied = self.view.heterogeneity.map_or(1.0, |varied| varied.factor(here, there));
+                        let mut bond = Bond::new(offset.xi, offset.length, self.view.weights[k] * varied);
                         if K::MEMORY {
                             // SAFETY: as of the slots of the block.
                             bond.memory = unsafe { *self.memory_of(k, here) }.to_f64();
@@ -294,6 +348,28 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         let bit = (block * self.view.families.offsets.len() + k) * BLOCK + slot % BLOCK;
         // SAFETY: `Exec` has checked that there is a number for each bit.
         unsafe { self.memory.numbers.0.add(bit) }
+    }
+
+    /// A bond of which each lane has a constant of its own.
+    #[inline(always)]
+    unsafe fn varied<V: Pack<P::Bond>>(&self, bond: Bond<D, V>, k: usize, first: usize) -> Bond<D, V> {
+        // SAFETY: there is a number for each slot, and those that an offset reaches are slots.
+        let mut factor = unsafe {
+            let here = self.view.compliance.as_ptr().add(first);
+            let there = here.offset(self.view.rows.get_unchecked(k).shift);
+            V::splat(1.0) / (V::load(here) + V::load(there))
+        };
+        if let Some(pairs) = self.view.heterogeneity.and_then(Heterogeneity::pairs) {
+            let mut factors = [P::Bond::default(); BLOCK];
+            for (lane, factor) in factors[..V::LANES].iter_mut().enumerate() {
+                let there = (first + lane).wrapping_add_signed(self.view.families.offsets[k].shift);
+                *factor = P::Bond::from_f64(pairs.of(first + lane, there));
+            }
+            // SAFETY: a pack has at most as many lanes as a block has slots.
+            factor = factor * unsafe { V::load(factors.as_ptr()) };
+        }
+        let [weight, spring, moment] = [bond.weight * factor, bond.spring * factor, bond.moment * factor];
+        Bond { weight, spring, moment, ..bond }
     }
 
     #[inline(always)]

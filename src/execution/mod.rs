@@ -295,7 +295,7 @@ impl Exec {
         match &body.families {
             Families::Lattice(families) => {
                 let within = self.within.take();
-                let view = &lattice::View::new(families, &weights.by_offset, within.as_deref());
+                let view = &lattice::View::new(families, weights, within.as_deref());
                 let sum = lattice::Sum::<D, I, A, O, P, _> {
                     instructions,
                     view,
@@ -319,7 +319,7 @@ impl Exec {
                 broken
             }
             Families::Cloud(families) => {
-                let weights = &weights.by_length;
+                let (weights, heterogeneity) = (&weights.by_length, weights.heterogeneity.as_deref());
                 let mut records = std::mem::take(P::records(&mut self.double, &mut self.single));
                 let values: Vec<&[P::Field]> = input.iter().chain(&added).copied().collect();
                 cloud::gather_input(&values, &mut records);
@@ -328,6 +328,7 @@ impl Exec {
                     instructions,
                     families,
                     weights,
+                    heterogeneity,
                     profile: weights.profile(sites.volume_unit, <P::Baseline as Lane>::SINGLE),
                     sites,
                     states,

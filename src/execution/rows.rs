@@ -5,6 +5,7 @@
 
 use super::lattice;
 use super::packs::{Instructions, LoadEnds, Pack, Packs};
+use crate::discretization::Heterogeneity;
 use crate::family::{Bond, BondKernel};
 use crate::field::Number;
 use crate::geometry::lattice::BLOCK;
@@ -12,7 +13,10 @@ use crate::geometry::lattice::BLOCK;
 /// A sum of a linear kernel over the blocks of a lattice.
 pub struct Sum<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K> {
     pub bonds: &'a lattice::Sum<'a, D, I, A, O, P, K>,
+    /// Once for each level of the heterogeneity, as the rows of the view.
     pub pairs: Vec<Pair<I, O, P::Bond>>,
+    /// In each level.
+    n: usize,
     pub instructions: Instructions,
 }
 
@@ -29,9 +33,9 @@ impl<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Pack
     /// Reads the matrices off the kernel: column by column, its values at unit vectors.
     pub fn new(bonds: &'a lattice::Sum<'a, D, I, A, O, P, K>) -> Self {
         let view = bonds.view;
-        let pair = |k: usize| {
+        let pair = |(factor, k): (f64, usize)| {
             let offset = &view.families.offsets[k];
-            let bond = Bond::new(offset.xi, offset.length, view.weights[k]);
+            let bond = Bond::new(offset.xi, offset.length, view.weights[k] * factor);
             let mut matrix = [[P::Bond::default(); I]; O];
             for i in 0..I {
                 let mut unit = [0.0; I];
@@ -48,7 +52,10 @@ impl<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Pack
             let half = class.members << (class.axes - 1);
             class.first as usize..(class.first + half) as usize
         });
-        Sum { bonds, pairs: halves.map(pair).collect(), instructions: bonds.instructions }
+        let levels = view.heterogeneity.map_or(&[][..], Heterogeneity::levels);
+        let factors = std::iter::once(1.0).chain(levels.iter().copied());
+        let pairs: Vec<_> = factors.flat_map(|factor| halves.clone().map(move |k| (factor, k))).map(pair).collect();
+        Sum { bonds, n: pairs.len() / (1 + levels.len()), pairs, instructions: bonds.instructions }
     }
 
     /// Sums the blocks of one chunk.
@@ -60,20 +67,23 @@ impl<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Pack
             // SAFETY: as in `lattice::Sum::run`.
             unsafe {
                 let words = std::slice::from_raw_parts(self.bonds.states.0.add(block as usize * n), n);
-                if words.iter().fold(u16::MAX, |all, word| all & word) == u16::MAX {
-                    self.sum(slot);
-                } else {
-                    self.bonds.sum::<true>(words, slot);
+                match view.level(block) {
+                    Some(level) if words.iter().fold(u16::MAX, |all, word| all & word) == u16::MAX => {
+                        self.sum(slot, level);
+                    }
+                    level => {
+                        self.bonds.bonds::<true>(words, slot, level);
+                    }
                 }
             }
         }
     }
 
-    compiled!(sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP, [], (slot: usize), ());
+    compiled!(sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP, [], (slot: usize, level: usize), ());
 
-    /// Applies the row at the points of one block; mirror images are added as in the sum over bonds.
+    /// Applies the row of a level at the points of one block; mirror images are added as in the sum over bonds.
     #[inline(always)]
-    unsafe fn sum_on<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, slot: usize) {
+    unsafe fn sum_on<V: Pack<P::Bond> + LoadEnds<P::Field>>(&self, slot: usize, level: usize) {
         let input = &self.bonds.input;
         for part in 0..BLOCK / V::LANES {
             let first = slot + part * V::LANES;
@@ -84,7 +94,7 @@ impl<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Pack
             }
             let mut total = [V::splat(0.0); O];
             let mut waiting = [[V::splat(0.0); O]; 3];
-            let mut pairs = self.pairs.iter();
+            let mut pairs = self.pairs[level * self.n..].iter();
             for class in &self.bonds.view.families.classes {
                 for sequence in 0..1 << (class.axes - 1) {
                     let mut sum = [V::splat(0.0); O];

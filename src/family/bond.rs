@@ -44,6 +44,9 @@ pub trait BondKernel<const D: usize, const I: usize, const O: usize, const A: us
     /// Whether it is summed in every step: then it is compiled for every set of instructions, and for plain weights apart.
     /// What is summed now and then gets along without, with the same bits.
     const EVERY_STEP: bool = false;
+    /// Of a sum in every step: whether bodies of several materials may be asked for it, for which its weights are looked up
+    /// point by point where materials meet.
+    const VARIED: bool = false;
     /// Whether the summand is linear in the relative values and the same along −ξ as along ξ.
     const LINEAR: bool = false;
     /// Whether the summand is zero where the ends have the same values. Broken bonds are given as such, which saves

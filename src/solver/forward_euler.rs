@@ -20,7 +20,7 @@ impl ForwardEuler {
         let (t, dt) = (clock.time(), clock.dt);
         let mut unknown = system.unknown();
         let by = dt / unknown.inertia;
-        with!(unknown, vectors => go(vectors.value, vectors.rate, by));
+        with!(unknown, vectors => go(vectors.value, vectors.rate, by, vectors.relative_inertia));
         clock.step += 1;
         system.constrain(Stage::Drift, t, dt);
         system.evolve(clock.time(), dt);
@@ -28,11 +28,19 @@ impl ForwardEuler {
 }
 
 /// u + Δt Ċ
-fn go<T: Number>(value: &mut [T], rate: &[T], by: f64) {
+fn go<T: Number>(value: &mut [T], rate: &[T], by: f64, relative: Option<&[T]>) {
     let by = T::from_f64(by);
-    value.par_chunks_mut(CHUNK).zip(rate.par_chunks(CHUNK)).for_each(|(u, rate)| {
-        for (u, rate) in u.iter_mut().zip(rate) {
-            *u = *u + by * *rate;
+    let chunks = value.par_chunks_mut(CHUNK).zip(rate.par_chunks(CHUNK)).enumerate();
+    chunks.for_each(|(chunk, (u, rate))| match relative {
+        None => {
+            for (u, rate) in u.iter_mut().zip(rate) {
+                *u = *u + by * *rate;
+            }
+        }
+        Some(relative) => {
+            for (k, (u, rate)) in u.iter_mut().zip(rate).enumerate() {
+                *u = *u + by * (*rate / relative[(chunk * CHUNK + k) % relative.len()]);
+            }
         }
     });
 }
@@ -52,7 +60,13 @@ mod tests {
         fn unknown(&mut self) -> Unknown<'_> {
             let (value, rate) = (&mut self.u[..], &mut self.rate[..]);
             Unknown {
-                vectors: Numbers::Double(Vectors { value, velocity: &mut [], rate, damped: None }),
+                vectors: Numbers::Double(Vectors {
+                    value,
+                    velocity: &mut [],
+                    rate,
+                    damped: None,
+                    relative_inertia: None,
+                }),
                 components: 1,
                 inertia: 1.0,
                 negligible: 0.0,

@@ -146,7 +146,7 @@ impl<T: Number> Stages<T> {
     }
 }
 
-/// Calls `update` on u and v, the force, u and v at the start and the sums of every unknown.
+/// Calls `update` on u and v, the force (over ρ/ρ₀ where that differs), u and v at the start and the sums of every unknown.
 fn each<T: Number>(
     vectors: &mut Vectors<'_, T>,
     stages: &mut Stages<T>,
@@ -156,11 +156,23 @@ fn each<T: Number>(
     let moving = vectors.value.par_chunks_mut(CHUNK).zip(vectors.velocity.par_chunks_mut(CHUNK));
     let fixed = vectors.rate.par_chunks(CHUNK).zip(u0.par_chunks(CHUNK)).zip(v0.par_chunks(CHUNK));
     let sums = du.par_chunks_mut(CHUNK).zip(dv.par_chunks_mut(CHUNK));
-    moving.zip(fixed).zip(sums).for_each(|(((u, v), ((f, u0), v0)), (du, dv))| {
+    let relative = vectors.relative_inertia;
+    moving.zip(fixed).zip(sums).enumerate().for_each(|(chunk, (((u, v), ((f, u0), v0)), (du, dv)))| {
         let moving = u.iter_mut().zip(v);
         let fixed = f.iter().zip(u0).zip(v0);
-        for (((u, v), ((f, u0), v0)), (du, dv)) in moving.zip(fixed).zip(du.iter_mut().zip(dv)) {
-            update([u, v], *f, [*u0, *v0], [du, dv]);
+        let all = moving.zip(fixed).zip(du.iter_mut().zip(dv));
+        match relative {
+            None => {
+                for (((u, v), ((f, u0), v0)), (du, dv)) in all {
+                    update([u, v], *f, [*u0, *v0], [du, dv]);
+                }
+            }
+            Some(relative) => {
+                for (k, (((u, v), ((f, u0), v0)), (du, dv))) in all.enumerate() {
+                    let relative = relative[(chunk * CHUNK + k) % relative.len()];
+                    update([u, v], *f / relative, [*u0, *v0], [du, dv]);
+                }
+            }
         }
     });
 }
@@ -195,7 +207,13 @@ mod tests {
         fn unknown(&mut self) -> Unknown<'_> {
             let [u, v, f] = self.state.each_mut().map(std::slice::from_mut);
             Unknown {
-                vectors: Numbers::Double(Vectors { value: u, velocity: v, rate: f, damped: None }),
+                vectors: Numbers::Double(Vectors {
+                    value: u,
+                    velocity: v,
+                    rate: f,
+                    damped: None,
+                    relative_inertia: None,
+                }),
                 components: 1,
                 inertia: 1.0,
                 negligible: 0.0,

@@ -50,6 +50,9 @@ impl VelocityVerlet {
         let drift = Drift::new(self, &unknown, dt, true);
         with!(unknown, vectors => {
             let kick = Kick::new(&drift);
+            if let Some(relative) = vectors.relative_inertia {
+                return finish_varied(kick, vectors.velocity, vectors.rate, relative);
+            }
             let chunks = vectors.velocity.par_chunks_mut(CHUNK).zip(vectors.rate.par_chunks(CHUNK));
             let squares = chunks.map(|(velocity, force)| wide(Chunk { kick, velocity, force }));
             squares.collect::<Vec<f64>>().iter().sum()
@@ -89,10 +92,15 @@ impl Drift {
         }
     }
 
-    /// The pass over all numbers. Gives Σ v² after the kick that was pending, and zero if none was.
+    /// The pass over all numbers. Gives Σ v² (times ρ/ρ₀ where that differs) after the kick that was pending, and zero if none
+    /// was.
     pub fn everywhere(&self, unknown: &mut Unknown<'_>) -> f64 {
         with!(unknown, vectors => {
-            let Vectors { value, velocity, rate, damped } = vectors;
+            let Vectors { value, velocity, rate, damped, relative_inertia } = vectors;
+            if let Some(relative) = *relative_inertia {
+                let damped = damped.as_mut().map_or(&mut [][..], |(_, damped)| &mut **damped);
+                return self.everywhere_varied(value, velocity, rate, damped, relative);
+            }
             let chunks = value.par_chunks_mut(CHUNK).zip(velocity.par_chunks_mut(CHUNK)).zip(rate.par_chunks(CHUNK));
             let squares: Vec<f64> = match damped {
                 Some((_, damped)) => {
@@ -103,6 +111,37 @@ impl Drift {
             };
             squares.iter().sum()
         })
+    }
+
+    fn everywhere_varied<T: Number>(
+        &self,
+        value: &mut [T],
+        velocity: &mut [T],
+        rate: &[T],
+        damped: &mut [T],
+        relative: &[T],
+    ) -> f64 {
+        let [keep, dt, tau, still] = [self.keep, self.dt, self.tau, self.still].map(T::from_f64);
+        let (n, has_damped) = (relative.len(), !damped.is_empty());
+        let mut squares = 0.0;
+        for c in 0..value.len() / n {
+            let part = c * n..(c + 1) * n;
+            let damped = if has_damped { &mut damped[part.clone()] } else { &mut [][..] };
+            let mut damped = damped.chunks_mut(CHUNK);
+            let chunks: Vec<_> = value[part.clone()]
+                .chunks_mut(CHUNK)
+                .zip(velocity[part.clone()].chunks_mut(CHUNK))
+                .zip(rate[part].chunks(CHUNK).zip(relative.chunks(CHUNK)))
+                .map(|((displacement, velocity), (force, relative))| {
+                    let (kick, damped) = (Kick::new(self), damped.next().unwrap_or_default());
+                    let pass = Pass { kick, keep, dt, tau, still, displacement, velocity, force, damped };
+                    VariedPass { pass, relative, pending: self.pending }
+                })
+                .collect();
+            let sums: Vec<f64> = chunks.into_par_iter().map(wide).collect();
+            squares += sums.iter().sum::<f64>();
+        }
+        squares
     }
 
     /// The pass over some numbers; `damped` is empty or gets u + τ v.
@@ -138,6 +177,79 @@ impl<T: Number> Kick<T> {
         let v = unless_below(self.slow, (v + self.factor * f) * self.after);
         *square += v.to_f64() * v.to_f64();
         v
+    }
+
+    /// The same of a place that is `relative` times as inert, as is the square that counts.
+    #[inline(always)]
+    fn kicked_varied(&self, v: T, f: T, relative: T, square: &mut f64) -> T {
+        let v = unless_below(self.slow, (v + self.factor * (f / relative)) * self.after);
+        *square += v.to_f64() * v.to_f64() * relative.to_f64();
+        v
+    }
+}
+
+/// The last half kick where inertia differs from place to place: Σ v² ρ/ρ₀.
+fn finish_varied<T: Number>(kick: Kick<T>, velocity: &mut [T], rate: &[T], relative: &[T]) -> f64 {
+    let components = velocity.par_chunks_mut(relative.len()).zip(rate.par_chunks(relative.len()));
+    let squares = components.flat_map(|(velocity, rate)| {
+        let chunks = velocity.par_chunks_mut(CHUNK).zip(rate.par_chunks(CHUNK)).zip(relative.par_chunks(CHUNK));
+        chunks.map(|((velocity, rate), relative)| wide(VariedChunk { kick, velocity, rate, relative }))
+    });
+    squares.collect::<Vec<f64>>().iter().sum()
+}
+
+struct VariedChunk<'a, T> {
+    kick: Kick<T>,
+    velocity: &'a mut [T],
+    rate: &'a [T],
+    relative: &'a [T],
+}
+
+impl<T: Number> Sweep for VariedChunk<'_, T> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let mut squares = [0.0; LANES];
+        let n = self.velocity.len();
+        let (rate, relative) = (&self.rate[..n], &self.relative[..n]);
+        for k in 0..n {
+            let square = &mut squares[k % LANES];
+            self.velocity[k] = self.kick.kicked_varied(self.velocity[k], rate[k], relative[k], square);
+        }
+        squares.iter().sum()
+    }
+}
+
+/// [`Pass`] where inertia differs from place to place.
+struct VariedPass<'a, T> {
+    pass: Pass<'a, T>,
+    relative: &'a [T],
+    pending: bool,
+}
+
+impl<T: Number> Sweep for VariedPass<'_, T> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let Pass { kick, keep, dt, tau, still, displacement, velocity, force, damped } = self.pass;
+        let mut squares = [0.0; LANES];
+        let n = displacement.len();
+        let (velocity, force, relative) = (&mut velocity[..n], &force[..n], &self.relative[..n]);
+        for k in 0..n {
+            let mut v = velocity[k];
+            if self.pending {
+                v = kick.kicked_varied(v, force[k], relative[k], &mut squares[k % LANES]);
+            }
+            v = unless_below(kick.slow, keep * v + kick.factor * (force[k] / relative[k]));
+            velocity[k] = v;
+            displacement[k] = unless_below(still, displacement[k] + dt * v);
+            if let Some(damped) = damped.get_mut(k) {
+                *damped = displacement[k] + tau * v;
+            }
+        }
+        squares.iter().sum()
     }
 }
 
@@ -256,7 +368,13 @@ mod tests {
         fn unknown(&mut self) -> Unknown<'_> {
             let [u, v, f] = self.0.each_mut().map(std::slice::from_mut);
             Unknown {
-                vectors: Numbers::Double(Vectors { value: u, velocity: v, rate: f, damped: None }),
+                vectors: Numbers::Double(Vectors {
+                    value: u,
+                    velocity: v,
+                    rate: f,
+                    damped: None,
+                    relative_inertia: None,
+                }),
                 components: 1,
                 inertia: 1.0,
                 negligible: 0.0,

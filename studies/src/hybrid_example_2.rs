@@ -227,7 +227,7 @@ impl System for Square {
     fn unknown(&mut self) -> Unknown<'_> {
         let (value, rate) = (&mut self.concentration[..], &mut self.rate[..]);
         Unknown {
-            vectors: Numbers::Double(Vectors { value, velocity: &mut [], rate, damped: None }),
+            vectors: Numbers::Double(Vectors { value, velocity: &mut [], rate, damped: None, relative_inertia: None }),
             components: 1,
             inertia: 1.0,
             negligible: 0.0,

@@ -103,7 +103,7 @@ fn plain<const D: usize, P: Packs>(elasticity: &Elasticity<D, P>, memory: &mut [
         for (bit, there) in body.bonds_of(slot).filter(|(bit, _)| state.states.holds(*bit)) {
             let xi = body.xi(bit, slot, there);
             let length = xi.iter().map(|x| x * x).sum::<f64>().sqrt();
-            let mut bond = Bond::new(xi, length, operator.weights.of(body, bit, there, &xi));
+            let mut bond = Bond::new(xi, length, operator.weights.of(body, bit, [slot, there], &xi));
             let eta = std::array::from_fn(|d| u[d][there].to_f64() - u[d][slot].to_f64());
             let strain = Softening.strain(&bond, &eta);
             bond.memory = memory[bit];

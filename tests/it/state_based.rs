@@ -68,7 +68,7 @@ impl<const D: usize, L: Stretch<D>> Specimen<D, L> {
         let body = standard::body(cloud, ratio * SPACING, rule);
         let moduli = Moduli::new(hypothesis, YOUNG, poisson);
         let operator = Operator::standard(&body, moduli.strength(&influence, body.horizon), influence, rule);
-        let solid = LinearSolid::new(law, moduli, &body, &operator.weights);
+        let solid = LinearSolid::new(law, &[moduli], &body, &operator.weights);
         let physics = Held::new(&body, operator, Box::new(solid), DENSITY, None);
         let stiffness = hypothesis.stiffness_with(YOUNG, poisson);
         Specimen {
@@ -129,7 +129,7 @@ impl<const D: usize, L: Stretch<D>> Specimen<D, L> {
     /// θ by slot.
     fn dilatation(&self, state: &State) -> Vec<f64> {
         let mut elasticity = self.physics.0.lock().unwrap();
-        let solid = LinearSolid::<L, f64>::new(self.law, self.moduli, &self.body, &elasticity.operator.weights);
+        let solid = LinearSolid::<L, f64>::new(self.law, &[self.moduli], &self.body, &elasticity.operator.weights);
         let (_, mut on, _) = elasticity.parts();
         solid.dilatation(&mut on, &state.states, components::<D, _>(&state.displacement))
     }
@@ -775,7 +775,7 @@ fn rounded<const D: usize, P: Packs>(cloud: &Cloud<D>, poisson: f64, ratio: f64)
         std::array::from_fn(|d| 1e-3 * x[d] + noise[d])
     });
     let operator = Operator::standard(&s.body, s.moduli.strength(&s.influence, s.body.horizon), s.influence, s.rule);
-    let solid = LinearSolid::new(BondBased, s.moduli, &s.body, &operator.weights);
+    let solid = LinearSolid::new(BondBased, &[s.moduli], &s.body, &operator.weights);
     let held = Held::<D, P>::new(&s.body, operator, Box::new(solid), DENSITY, None);
     let mut other = held.initial_state();
     for (u, exact) in other.displacement.iter_mut().zip(&state.displacement) {

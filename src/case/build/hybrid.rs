@@ -27,7 +27,7 @@ impl<const D: usize> Builder<'_, D> {
         scaling: &BondWeighting,
         unit: f64,
     ) -> Result<Elasticity<D, P>> {
-        let (body, density, failure) = (&elasticity.body, elasticity.density, &elasticity.failure);
+        let (body, density, failure) = (&elasticity.body, elasticity.density.unit, &elasticity.failure);
         let Arrangement::Lattice(lattice) = &body.cloud.arrangement else {
             return Err(self.refuse(PATH, "the hybrid scheme is for lattices", ""));
         };

@@ -1,6 +1,9 @@
 //! One row for all points of a lattice, in the order in which it is summed.
 
+use std::sync::Arc;
+
 use super::Fit;
+use crate::discretization::Heterogeneity;
 use crate::error::{Error, Result};
 use crate::family::{Class, mirror_sequences};
 use crate::geometry::Lattice;
@@ -16,6 +19,9 @@ pub struct SharedRow<const D: usize> {
     /// axes, in the second of three, in both.
     pub pairs: Vec<Pair<D>>,
     pub classes: Vec<RowClass>,
+    /// What the row is multiplied by, point by point, where families of one constant have not all the same; None in a body
+    /// of one.
+    pub heterogeneity: Option<Arc<Heterogeneity>>,
 }
 
 /// Pairs whose ξ lie along the same axes.
@@ -58,7 +64,7 @@ impl<const D: usize> SharedRow<D> {
     pub fn new(lattice: &Lattice<D>, fit: &Fit<D>, weights: &[[[f64; D]; D]]) -> Result<Self> {
         let (nodes, classes) = halves(lattice, fit)?;
         let pairs = nodes.iter().map(|&(shift, node)| Pair { shift, weight: weights[node] }).collect();
-        let row = SharedRow { pairs, classes };
+        let row = SharedRow { pairs, classes, heterogeneity: None };
         if !row.is_mirrored() {
             return Err(Error::Refused("mirrored nodes of a shared row have mirrored weights".into()));
         }

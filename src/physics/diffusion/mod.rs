@@ -251,6 +251,7 @@ struct Conduction(u32);
 
 impl<const D: usize> BondKernel<D, 1, 1> for Conduction {
     const EVERY_STEP: bool = true;
+    const VARIED: bool = true;
     const LINEAR: bool = true;
 
     #[inline(always)]

@@ -187,9 +187,11 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         let density = self.energy_density();
         let v = components::<D, _>(&self.state.velocity);
         let kinetic = |slot: usize| v.iter().map(|v| v[slot].to_f64().powi(2)).sum::<f64>();
-        let rho = self.density;
-        let mut energies: Vec<f64> =
-            density.iter().enumerate().map(|(slot, w)| w.to_f64() + 0.5 * rho * kinetic(slot)).collect();
+        let mut energies: Vec<f64> = density
+            .iter()
+            .enumerate()
+            .map(|(slot, w)| w.to_f64() + 0.5 * self.density.at(slot) * kinetic(slot))
+            .collect();
         let largest = energies.iter().copied().fold(0.0, f64::max);
         if largest > 0.0 {
             energies.iter_mut().for_each(|energy| *energy /= largest);

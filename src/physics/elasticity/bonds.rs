@@ -5,6 +5,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::State;
+use super::density::Density;
 use super::kernels::{Diagonal, DiagonalRow, Energy, Force, Spring};
 use super::material::{Material, On, RowBoundary};
 use super::surface::{Shares, shares_of_bonds};
@@ -50,24 +51,25 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
         L::LINEAR
     }
 
-    /// Δt = √(2ρ / max Σ k β V′), k the spring constant of a bond.
+    /// Δt = √(2 min ρ / Σ k β V′), k the spring constant of a bond.
     ///
     /// Silling & Askari (2005), by a Gershgorin bound on the spectral radius: never too large for a linear body, and
     /// for stretches far below one not too large for a nonlinear one either.
-    fn stable_step(&self, on: &mut On<'_, D>, density: f64) -> f64 {
+    fn stable_step(&self, on: &mut On<'_, D>, density: &Density<P::Field>) -> f64 {
         let weights = &on.operator.weights;
-        let stiffest = match &on.body.families {
-            Families::Lattice(families) => {
-                families.offsets.iter().zip(&weights.by_offset).map(|(o, w)| w / o.length).sum::<f64>()
+        let softest = match &on.body.families {
+            Families::Lattice(families) if weights.heterogeneity.is_none() && density.is_same() => {
+                let all = families.offsets.iter().zip(&weights.by_offset).map(|(o, w)| w / o.length).sum::<f64>();
+                density.unit / all
             }
-            Families::Cloud(_) => {
+            _ => {
                 let mut spring = vec![0.0; on.body.cloud.n_slots()];
                 let whole = BondStates::whole(on.body);
                 on.exec.sum_bonds::<D, 0, 1, Double>(on.body, weights, &whole, [], [&mut spring], &Spring);
-                spring.into_iter().fold(0.0, f64::max)
+                density.least_over(&spring)
             }
         };
-        (2.0 * density / stiffest).sqrt()
+        (2.0 * softest).sqrt()
     }
 
     fn first_pass(

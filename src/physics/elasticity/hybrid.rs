@@ -13,6 +13,7 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
 use super::State;
+use super::density::Density;
 use super::material::{Material, On, Overstretched, RowBoundary};
 use super::surface::Shares;
 use crate::discretization::collocation::{SharedRow, SharedSlope};
@@ -279,14 +280,22 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
         self.inner.is_linear()
     }
 
-    /// Δt = √(τ² + 4/ω²) − τ, for rows with ω² = Λ/ρ, and for bonds.
+    /// Δt = √(τ² + 4/ω²) − τ, for rows with ω² = max Λ c/(c₀ ρ), and for bonds.
     ///
     /// With u(n+1) = u(n) + Δt v(n+½) and v(n+3/2) = v(n+½) − Δt ω² (u(n+1) + τ v(n+½)) the larger root leaves the unit circle
     /// where ω² Δt² + 2 ω² τ Δt = 4.
-    fn stable_step(&self, on: &mut On<'_, D>, density: f64) -> f64 {
+    fn stable_step(&self, on: &mut On<'_, D>, density: &Density<P::Field>) -> f64 {
         let bonds = self.inner.stable_step(on, density);
         let damped = |square: f64| (self.damping.powi(2) + square).sqrt() - self.damping;
-        let rows = damped(4.0 * density / self.radius);
+        let softest = match &self.row.heterogeneity {
+            None if density.is_same() => density.unit,
+            varied => {
+                let relative = |slot: &u32| varied.as_ref().map_or(1.0, |varied| varied.relative(*slot as usize));
+                let ratio = |slot: &u32| density.at(*slot as usize) / relative(slot);
+                on.body.cloud.slots.iter().map(ratio).fold(f64::INFINITY, f64::min)
+            }
+        };
+        let rows = damped(4.0 * softest / self.radius);
         rows.min(if self.damps_bonds { damped(bonds * bonds) } else { bonds })
     }
 

@@ -23,6 +23,7 @@ pub(super) struct Force<L>(pub L);
 impl<const D: usize, B: BondLaw<D>> BondKernel<D, D, D> for Force<B> {
     const SMALL: f64 = B::SMALL;
     const EVERY_STEP: bool = true;
+    const VARIED: bool = true;
     const LINEAR: bool = B::LINEAR;
     const MEMORY: bool = B::MEMORY;
 

@@ -34,6 +34,7 @@ use std::sync::Mutex;
 pub use moduli::Moduli;
 
 use super::State;
+use super::density::Density;
 use super::kernels::Energy;
 use super::laws::bond_based::{FORCE_SINGLE, STRETCH_SINGLE};
 use super::laws::{BondBased, BondBasedLinear};
@@ -54,7 +55,8 @@ use crate::visit::Visitor;
 #[derive(Debug, Clone)]
 pub struct LinearSolid<L, F: Number> {
     law: L,
-    pub moduli: Moduli,
+    /// One for all slots, or one for each.
+    moduli: Vec<Moduli>,
     /// q by slot.
     stiffness: Vec<f64>,
     /// h by slot, 1/Pa.
@@ -68,19 +70,34 @@ pub struct LinearSolid<L, F: Number> {
 }
 
 impl<L, F: Number> LinearSolid<L, F> {
-    /// With c = [`Moduli::strength`]; `weights` are the c ω̃ β V′ of the body.
-    pub fn new<const D: usize>(law: L, moduli: Moduli, body: &Body<D>, weights: &BondWeights) -> Self {
+    /// With c = [`Moduli::strength`], of any of the moduli where there are several: it cancels. `moduli`: one for all slots, or
+    /// one for each; each end of a bond then pulls with its own. `weights` are the c ω̃ β V′ of the body.
+    pub fn new<const D: usize>(law: L, moduli: &[Moduli], body: &Body<D>, weights: &BondWeights) -> Self {
         let (mut exec, whole, n) = (Exec::default(), BondStates::whole(body), body.cloud.n_slots());
         let mut stiffness = vec![0.0; n];
         exec.sum_bonds::<D, 0, 1, Double>(body, weights, &whole, [], [&mut stiffness], &Moment);
         // A point without a family has neither.
         let over = |numerator: f64, moment: f64| if moment > 0.0 { numerator / moment } else { 0.0 };
-        let bulk: Vec<f64> = stiffness.iter().map(|&m| over(moduli.volumetric, m * m)).collect();
-        stiffness.iter_mut().for_each(|m| *m = over(moduli.deviatoric, *m));
+        let of = |slot: usize| moduli[slot.min(moduli.len() - 1)];
+        let bulk = stiffness.iter().enumerate().map(|(slot, &m)| over(of(slot).volumetric, m * m)).collect::<Vec<_>>();
+        stiffness.iter_mut().enumerate().for_each(|(slot, m)| *m = over(of(slot).deviatoric, *m));
         let bound = bound(body, weights, &stiffness, &bulk);
         let rounded = F::NEGLIGIBLE > f64::NEGLIGIBLE;
         let single = if rounded { stiffness.iter().map(|&q| q as f32).collect() } else { Vec::new() };
-        LinearSolid { law, moduli, stiffness, bulk, single, bound, dilatation_force: Default::default() }
+        LinearSolid {
+            law,
+            moduli: moduli.to_vec(),
+            stiffness,
+            bulk,
+            single,
+            bound,
+            dilatation_force: Default::default(),
+        }
+    }
+
+    /// Of the point in a slot.
+    fn moduli(&self, slot: usize) -> &Moduli {
+        self.moduli.get(slot).unwrap_or(&self.moduli[0])
     }
 
     /// S by slot.
@@ -128,8 +145,9 @@ impl<L, F: Number> LinearSolid<L, F> {
     {
         let mut sums = vec![0.0; on.body.cloud.n_slots()];
         self.sum::<D, Double>(on, states, u, &mut sums);
-        let share = D as f64 / self.moduli.deviatoric;
-        sums.iter_mut().zip(&self.stiffness).for_each(|(s, q)| *s *= share * q);
+        for (slot, (s, q)) in sums.iter_mut().zip(&self.stiffness).enumerate() {
+            *s *= D as f64 / self.moduli(slot).deviatoric * q;
+        }
         sums
     }
 
@@ -167,7 +185,7 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
         L::LINEAR
     }
 
-    /// √(4ρ/λ), with a bound λ of the operator's spectral radius: its norm of the
+    /// √(4/λ), with a bound λ of the spectral radius of the operator over ρ: its norm of the
     /// largest row sum. The bonds alone give 2 Σ k (q + q′), k = c ω̃ β V′/|ξ|, because |s ξ| ≤ |η|. What is volumetric gives
     ///
     /// ```text
@@ -176,8 +194,13 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
     ///
     /// because |S| ≤ (N + C) max |u|; and nothing where h < 0, since it then takes from an energy that stays positive.
     /// N + C of a family that has lost bonds is no more than before.
-    fn stable_step(&self, _: &mut On<'_, D>, density: f64) -> f64 {
-        (4.0 * density / self.bound[0]).sqrt()
+    fn stable_step(&self, on: &mut On<'_, D>, density: &Density<P::Field>) -> f64 {
+        let softest = if density.is_same() {
+            density.unit / self.bound[0]
+        } else {
+            density.least_over(&row_sums(on.body, &on.operator.weights, &self.stiffness, &self.bulk)[0])
+        };
+        (4.0 * softest).sqrt()
     }
 
     fn begin(&mut self) {
@@ -270,7 +293,7 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
     }
 
     fn shares(&self, on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares {
-        shares_of_solid(&self.moduli, on, scaling)
+        shares_of_solid(&self.moduli[0], on, scaling)
     }
 
     fn memory(&self) -> usize {
@@ -296,6 +319,12 @@ struct Lost {
 
 /// λ of [`Material::stable_step`], and λ over that of the bonds alone.
 fn bound<const D: usize>(body: &Body<D>, weights: &BondWeights, stiffness: &[f64], bulk: &[f64]) -> [f64; 2] {
+    let [with, without] = row_sums(body, weights, stiffness, bulk).map(|sums| sums.into_iter().fold(0.0, f64::max));
+    [with, if without > 0.0 { with / without } else { 1.0 }]
+}
+
+/// Bounds of the sums of all |entries| of a row, by slot: with dilatation, and of the bonds alone.
+fn row_sums<const D: usize>(body: &Body<D>, weights: &BondWeights, stiffness: &[f64], bulk: &[f64]) -> [Vec<f64>; 2] {
     let (n, whole, mut exec) = (body.cloud.n_slots(), BondStates::whole(body), Exec::default());
     let mut sums = |values: &[f64]| {
         let mut sums: [Vec<f64>; 5] = std::array::from_fn(|_| vec![0.0; n]);
@@ -308,10 +337,8 @@ fn bound<const D: usize>(body: &Body<D>, weights: &BondWeights, stiffness: &[f64
     let lean: Vec<f64> = (0..n).map(|i| directions[..D].iter().map(|d| d[i] * d[i]).sum::<f64>().sqrt()).collect();
     let push: Vec<f64> = (0..n).map(|i| bulk[i].max(0.0) * (length[i] + lean[i])).collect();
     let [_, pushed, ..] = sums(&push);
-    let largest = |row: &dyn Fn(usize) -> f64| (0..n).map(row).fold(0.0, f64::max);
-    let without = largest(&|i| 2.0 * bonds[i]);
-    let with = largest(&|i| 2.0 * bonds[i] + pushed[i] + push[i] * (lean[i] - length[i]));
-    [with, if without > 0.0 { with / without } else { 1.0 }]
+    let with = (0..n).map(|i| 2.0 * bonds[i] + pushed[i] + push[i] * (lean[i] - length[i])).collect();
+    [with, (0..n).map(|i| 2.0 * bonds[i]).collect()]
 }
 
 /// A bond law whose stretch a state-based solid uses.

@@ -4,6 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
 use super::State;
+use super::density::Density;
 use super::hybrid::Work;
 use super::surface::Shares;
 use crate::discretization::{BondWeighting, BondWeights, Operator, Regions};
@@ -29,8 +30,8 @@ pub struct On<'a, const D: usize> {
 pub trait Material<const D: usize, P: Packs>: Send + Sync {
     /// Whether forces are linear in displacements.
     fn is_linear(&self) -> bool;
-    /// Largest stable step of velocity Verlet, s; `density` in kg/m³.
-    fn stable_step(&self, on: &mut On<'_, D>, density: f64) -> f64;
+    /// Largest stable step of velocity Verlet, s.
+    fn stable_step(&self, on: &mut On<'_, D>, density: &Density<P::Field>) -> f64;
 
     /// Breaks the bonds that the displacements overstretch, then fills the internal force density. `dt`: see
     /// [`Physics::evolve`](crate::physics::Physics::evolve).

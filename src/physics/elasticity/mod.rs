@@ -5,6 +5,7 @@
 
 mod adapt;
 pub mod bonds;
+pub mod density;
 pub mod discrete;
 pub mod hybrid;
 mod kernels;
@@ -19,6 +20,7 @@ use std::ops::Range;
 
 pub use adapt::{Adaptation, INDICATORS};
 pub use bonds::Bonds;
+pub use density::Density;
 pub use hybrid::{Hybrid, Work};
 use kernels::bonded_volume;
 pub use linear_solid::LinearSolid;
@@ -40,8 +42,7 @@ use crate::visit::Visitor;
 pub struct Elasticity<const D: usize, P: Packs = Double> {
     pub body: Body<D>,
     pub operator: Operator,
-    /// ρ, kg/m³ (2D: unit thickness; 1D: unit cross-section).
-    pub density: f64,
+    pub density: Density<P::Field>,
     /// None: bonds never break.
     pub failure: Option<CriticalStretch>,
     pub material: Box<dyn Material<D, P>>,
@@ -90,7 +91,7 @@ impl<P: Precision> State<P> {
 }
 
 impl<const D: usize, P: Packs> Elasticity<D, P> {
-    /// A body at rest whose bonds are whole. `density` in kg/m³.
+    /// A body at rest whose bonds are whole. `density` in kg/m³ (2D: unit thickness; 1D: unit cross-section).
     pub fn new(
         body: Body<D>,
         operator: Operator,
@@ -102,7 +103,7 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         let mut elasticity = Elasticity {
             body,
             operator,
-            density,
+            density: Density::same(density),
             failure,
             material,
             n_bonds: state.states.count(),
@@ -213,10 +214,17 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
     fn unknown(&mut self) -> Unknown<'_> {
         let State { displacement, velocity, force, .. } = &mut self.state;
         let damped = self.material.damped();
+        let relative_inertia = (!self.density.is_same()).then_some(&self.density.relative[..]);
         Unknown {
-            vectors: P::Field::numbers(Vectors { value: displacement, velocity, rate: force, damped }),
+            vectors: P::Field::numbers(Vectors {
+                value: displacement,
+                velocity,
+                rate: force,
+                damped,
+                relative_inertia,
+            }),
             components: D,
-            inertia: self.density,
+            inertia: self.density.unit,
             negligible: P::Bond::NEGLIGIBLE * self.body.cloud.spacing,
         }
     }
@@ -232,6 +240,10 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
     }
 
     fn drift_and_evolve(&mut self, drift: &Drift, dt: f64) -> Option<f64> {
+        if !self.density.is_same() {
+            // The pass of a drift knows one inertia.
+            return None;
+        }
         let (material, mut on, state) = self.parts();
         material.drift_and_evolve(&mut on, state, drift, dt)
     }
@@ -251,7 +263,7 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
             failure: self.failure.as_ref(),
             exec: &mut Exec::default(),
         };
-        self.material.stable_step(&mut on, self.density)
+        self.material.stable_step(&mut on, &self.density)
     }
 
     fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field> {
@@ -278,8 +290,23 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
     }
 
     fn motion(&mut self) -> (f64, [f64; 3]) {
-        let (cloud, density) = (&self.body.cloud, self.density);
+        let (cloud, density) = (&self.body.cloud, &self.density);
         let velocity = components::<D, _>(&self.state.velocity);
+        if !density.is_same() {
+            let [square, momentum @ ..] = self.exec.sum(cloud.n_points(), &|points| {
+                let mut sum = [0.0; 4];
+                for slot in cloud.stored(points) {
+                    let mass = density.at(slot) * cloud.volume(slot);
+                    for d in 0..D {
+                        let v = velocity[d][slot].to_f64();
+                        sum[0] += mass * v * v;
+                        sum[d + 1] += mass * v;
+                    }
+                }
+                sum
+            });
+            return (0.5 * square, momentum);
+        }
         let (volumes, volume) = match &cloud.arrangement {
             // Slots without a point are at rest.
             Arrangement::Lattice(lattice) => (None, lattice.cell_volume()),
@@ -295,19 +322,19 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
             }
             sum
         });
-        let mass = density * volume;
+        let mass = density.unit * volume;
         (0.5 * mass * square, momentum.map(|p| mass * p))
     }
 
     fn motion_of(&self, squares: f64) -> Option<f64> {
         let Arrangement::Lattice(_) = self.body.cloud.arrangement else { return None };
         let volume = self.body.cloud.spacing.powi(D as i32);
-        Some(0.5 * self.density * volume * squares)
+        Some(0.5 * self.density.unit * volume * squares)
     }
 
     fn content(&mut self) -> Content {
         let density = self.energy_density();
-        let (cloud, rho) = (&self.body.cloud, self.density);
+        let (cloud, rho) = (&self.body.cloud, &self.density);
         let [u, v] = [&self.state.displacement, &self.state.velocity].map(|flat| components::<D, _>(flat));
         let n = cloud.n_points();
         let [stored, scale, ..] = self.exec.sum(n, &|points| {
@@ -315,12 +342,12 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
             for slot in cloud.stored(points) {
                 let volume = cloud.volume(slot);
                 strain += density[slot].to_f64() * volume;
-                scale += rho * volume * v.iter().map(|v| v[slot].to_f64().powi(2)).sum::<f64>().sqrt();
+                scale += rho.at(slot) * volume * v.iter().map(|v| v[slot].to_f64().powi(2)).sum::<f64>().sqrt();
             }
             [strain, scale, 0.0, 0.0]
         });
         let momentum_of = |slot: usize| -> [f64; 3] {
-            let mass = rho * cloud.volume(slot);
+            let mass = rho.at(slot) * cloud.volume(slot);
             embed::<D>(&std::array::from_fn(|d| mass * v[d][slot].to_f64()))
         };
         let angular = self.exec.sum(n, &|points| {
@@ -453,7 +480,9 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
 
     fn memory(&self) -> usize {
         let cloud = &self.body.cloud;
-        let fields = (3 * D + 1) * size_of::<P::Field>() * cloud.n_slots() + size_of_val(&cloud.slots[..]);
+        let fields = (3 * D + 1) * size_of::<P::Field>() * cloud.n_slots()
+            + size_of_val(&cloud.slots[..])
+            + size_of_val(&self.density.relative[..]);
         let classes = self.failure.as_ref().map_or(0, CriticalStretch::memory);
         let points = match &cloud.arrangement {
             Arrangement::Lattice(_) => 0,

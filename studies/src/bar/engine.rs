@@ -214,7 +214,7 @@ struct Moving<'a> {
 impl System for Moving<'_> {
     fn unknown(&mut self) -> Unknown<'_> {
         let (value, velocity) = (&mut self.motion.u[..], &mut self.motion.v[..]);
-        let vectors = Vectors { value, velocity, rate: &mut self.force, damped: None };
+        let vectors = Vectors { value, velocity, rate: &mut self.force, damped: None, relative_inertia: None };
         Unknown { vectors: Numbers::Double(vectors), components: 1, inertia: 1.0, negligible: f64::NEGLIGIBLE }
     }
 

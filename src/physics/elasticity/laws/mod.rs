@@ -73,10 +73,11 @@ macro_rules! define {
                 match self { $(Law::$name => Box::new(Bonds::new($module::$law)),)* }
             }
 
-            /// The material on a body. `moduli`: of a state-based solid; `weights`: strength × ω × β × V′.
+            /// The material on a body. `moduli`: of a state-based solid, one for all slots or one for each; `weights`: strength ×
+            /// ω × β × V′.
             pub fn material<const D: usize, P: Packs>(
                 self,
-                moduli: &Moduli,
+                moduli: &[Moduli],
                 body: &Body<D>,
                 weights: &BondWeights,
             ) -> Box<dyn Material<D, P>> {
@@ -91,7 +92,7 @@ macro_rules! define {
     (@solid solid) => { true };
     (@solid bonds) => { false };
     (@solid $module:ident $law:ident $moduli:ident $body:ident $weights:ident) => {
-        Box::new(LinearSolid::new($module::$law, *$moduli, $body, $weights))
+        Box::new(LinearSolid::new($module::$law, $moduli, $body, $weights))
     };
     (@bonds $module:ident $law:ident $moduli:ident $body:ident $weights:ident) => {
         Box::new(Bonds::new($module::$law))

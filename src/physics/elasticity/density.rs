@@ -1,0 +1,55 @@
+//! ρ of a body: one number, or one by point where materials differ.
+
+use crate::field::Number;
+
+/// Densities, in the numbers of the fields that they divide.
+#[derive(Debug, Clone)]
+pub struct Density<F> {
+    /// ρ₀, kg/m³ (2D: unit thickness; 1D: unit cross-section): of all points, or what theirs are multiples of.
+    pub unit: f64,
+    /// ρ/ρ₀ by slot; empty where all points have ρ₀.
+    pub relative: Vec<F>,
+}
+
+impl<F: Number> Density<F> {
+    /// Of all points, kg/m³.
+    pub fn same(density: f64) -> Self {
+        Density { unit: density, relative: Vec::new() }
+    }
+
+    /// ρ by slot, kg/m³; zero where there is no point.
+    pub fn by_slot(densities: &[f64]) -> Self {
+        let unit = densities.iter().copied().find(|&density| density > 0.0).unwrap_or(1.0);
+        if densities.iter().all(|&density| density == unit || density == 0.0) {
+            return Density::same(unit);
+        }
+        // A slot without a point is at rest whatever it weighs.
+        let relative = |&density: &f64| F::from_f64(if density > 0.0 { density / unit } else { 1.0 });
+        Density { unit, relative: densities.iter().map(relative).collect() }
+    }
+
+    /// kg/m³
+    #[inline]
+    pub fn at(&self, slot: usize) -> f64 {
+        self.relative.get(slot).map_or(self.unit, |relative| self.unit * relative.to_f64())
+    }
+
+    pub fn is_same(&self) -> bool {
+        self.relative.is_empty()
+    }
+
+    /// The smallest of ρ over a number of each slot, or with the largest number where ρ is one: what bounds a step.
+    pub fn least_over(&self, numbers: &[f64]) -> f64 {
+        if self.is_same() {
+            return self.unit / numbers.iter().copied().fold(0.0, f64::max);
+        }
+        let ratio = |(slot, &number): (usize, &f64)| if number > 0.0 { self.at(slot) / number } else { f64::INFINITY };
+        numbers.iter().enumerate().map(ratio).fold(f64::INFINITY, f64::min)
+    }
+
+    /// For points of which each is of the material of one before: `from` by slot.
+    pub fn inherited(&self, from: &[usize]) -> Self {
+        let relative = if self.is_same() { Vec::new() } else { from.iter().map(|&old| self.relative[old]).collect() };
+        Density { unit: self.unit, relative }
+    }
+}
