@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use bondwise::Result;
 use bondwise::case::build::{Options, available_memory, load};
+use bondwise::output::source::MaterialSummary;
 
 use crate::{CaseArgs, on_threads, say};
 
@@ -33,6 +34,7 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
         if let Some(speed) = facts.rayleigh_speed {
             say!("Rayleigh speed    {speed:.1} m/s");
         }
+        materials(&facts.materials);
         say!("stable step       {:.6e} s", facts.stable_step * simulation.solver.stability());
         let steps = simulation.stages_to_come.front().map_or(simulation.n_steps, |leg| leg.first);
         let end = steps as f64 * simulation.clock.dt;
@@ -49,6 +51,41 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
         histogram(&families);
         Ok(ExitCode::SUCCESS)
     })?
+}
+
+/// A table of materials, if there are several.
+fn materials(list: &[MaterialSummary]) {
+    if list.is_empty() {
+        return;
+    }
+    let width = list.iter().map(|material| material.name.len()).max().unwrap_or(0).max(8);
+    say!(
+        "{:<width$} {:>9} {:>11} {:>8} {:>8} {:>8} {:>8} {:>11} {:>11}",
+        "material",
+        "points",
+        "volume",
+        "bar m/s",
+        "long.",
+        "shear",
+        "Rayleigh",
+        "step s",
+        "stretch"
+    );
+    let speed = |speed: Option<f64>| speed.map_or("-".into(), |speed| format!("{speed:.0}"));
+    for m in list {
+        say!(
+            "{:<width$} {:>9} {:>11.4e} {:>8.0} {:>8.0} {:>8} {:>8} {:>11.4e} {:>11}",
+            m.name,
+            m.points,
+            m.volume,
+            m.bar_speed,
+            m.longitudinal_speed,
+            speed(m.shear_speed),
+            speed(m.rayleigh_speed),
+            m.stable_step,
+            m.critical_stretch.map_or("never".into(), |stretch| format!("{stretch:.4e}"))
+        );
+    }
 }
 
 /// At most twelve bars of equal width.

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use bondwise::Result;
+use bondwise::case::library::{LibraryMaterial, Values};
 use bondwise::case::{Case, bundled, schema_of};
 use bondwise_studies::STUDIES;
 use serde_json::Value;
@@ -11,12 +12,13 @@ use crate::bench::PROBLEMS;
 use crate::say;
 
 /// What can be listed.
-pub const TOPICS: [&str; 17] = [
+pub const TOPICS: [&str; 18] = [
     "cases",
     "shapes",
     "regions",
     "cracks",
     "laws",
+    "materials",
     "failures",
     "influence",
     "volumes",
@@ -72,6 +74,15 @@ fn items(topic: &str, schema: &Value) -> Vec<(String, String)> {
     let plain = |pair: (&str, &str)| (pair.0.to_string(), pair.1.to_string());
     match topic {
         "cases" => bundled::CASES.iter().map(|c| plain((c.name, c.about))).collect(),
+        "materials" => {
+            let about = |material: &LibraryMaterial| {
+                let Values { young, density, poisson, fracture_energy, source } = material.values();
+                let energy = fracture_energy.map_or(String::new(), |energy| format!(", G₀ = {energy} J/m²"));
+                let about = format!("E = {} GPa, ρ = {density} kg/m³, ν = {poisson}{energy} ({source})", 1e-9 * young);
+                (material.name().to_string(), about)
+            };
+            LibraryMaterial::ALL.iter().map(about).collect()
+        }
         "studies" => STUDIES.iter().map(|s| plain((s.name, s.about))).collect(),
         "problems" => PROBLEMS.iter().map(|p| plain((p.name, p.about))).collect(),
         "conditions" => {

@@ -3,6 +3,7 @@
 mod conditions;
 mod geometry;
 mod hybrid;
+mod materials;
 mod outputs;
 
 use std::collections::VecDeque;
@@ -45,6 +46,7 @@ use crate::solver::statics::Method;
 use crate::solver::{Clock, RungeKutta, Solver, Statics, VelocityVerlet};
 use conditions::motion_name;
 pub use geometry::available_memory;
+use materials::Values;
 use outputs::{names, schedule, style, tip_window};
 
 /// How a case is to be run, beside what it says itself.
@@ -139,12 +141,16 @@ impl<const D: usize> Builder<'_, D> {
             (2, _) => Hypothesis::PlaneStress,
             _ => Hypothesis::Solid,
         };
-        let moduli = Moduli::new(hypothesis, parameters.young, parameters.poisson.unwrap_or(0.0));
+        // What the weights are made for; where materials differ, the first of them.
+        let reference = self.reference(&cloud)?;
+        let moduli_of = |values: &Values| Moduli::new(hypothesis, values.young, values.poisson);
+        let moduli = moduli_of(&reference);
         let solid = self.law().is_state_based().then_some(moduli);
-        let strength = match &solid {
-            Some(solid) => solid.strength(&influence, horizon),
-            None => moduli::micromodulus(hypothesis, &influence, parameters.young, horizon),
+        let strength_of = |values: &Values| match &solid {
+            Some(_) => moduli_of(values).strength(&influence, horizon),
+            None => moduli::micromodulus(hypothesis, &influence, values.young, horizon),
         };
+        let strength = strength_of(&reference);
         let tolerance = 1e-9 * cloud.spacing;
         let scaling = BondWeighting { strength, horizon, influence, rule };
         let adaptation = match &case.refinement {
@@ -158,7 +164,7 @@ impl<const D: usize> Builder<'_, D> {
             if adaptation.criteria.is_some() {
                 let operator = Operator::standard(&lattice, strength, influence, rule);
                 let mut on = On { body: &lattice, operator: &operator, failure: None, exec: &mut Exec::default() };
-                let step = self.law().bonds::<D, P>().stable_step(&mut on, &Density::same(parameters.density));
+                let step = self.law().bonds::<D, P>().stable_step(&mut on, &Density::same(reference.density));
                 finest_step = step / f64::from(1u32 << adaptation.cells.levels);
             }
         }
@@ -176,12 +182,16 @@ impl<const D: usize> Builder<'_, D> {
             }
         }
         self.sets(&mut cloud, shape.as_ref())?;
-        let critical = |energy| match &solid {
-            Some(solid) => solid.critical_stretch(&influence, energy, horizon),
-            None => moduli::critical_stretch(hypothesis, &influence, strength, energy, horizon),
+        let critical = |values: &Values, energy: f64| match &solid {
+            Some(_) => moduli_of(values).critical_stretch(&influence, energy, horizon),
+            None => moduli::critical_stretch(hypothesis, &influence, strength_of(values), energy, horizon),
         };
-        let mut failure = self.failure(&cloud, &critical)?;
-        let (body, operator) = match &adaptation {
+        let composition = self.composition(&mut cloud, &critical)?;
+        let mut failure = match &composition {
+            None => self.failure(&cloud, &|energy| critical(&reference, energy))?,
+            Some(composition) => self.failure_by_material(&cloud, composition, &critical)?,
+        };
+        let (body, mut operator) = match &adaptation {
             None => {
                 let body = standard::body(cloud, horizon, rule);
                 let operator = match &correction {
@@ -215,13 +225,34 @@ impl<const D: usize> Builder<'_, D> {
             Scheme::Hybrid(settings) => Some(settings),
             Scheme::Standard => None,
         };
-        let material = self.law().material::<D, P>(&[moduli], &body, &operator.weights);
-        let mut elasticity = Elasticity::new(body, operator, material, parameters.density, failure);
         if settings.is_some_and(|settings| settings.rescale) {
-            hybrid::rescale(&mut elasticity, &scaling);
+            hybrid::rescale(&body, &mut operator, &scaling);
         }
-        let (material, mut on, _) = elasticity.parts();
-        let surface = surface_effect(material, &mut on, &scaling);
+        let mut material = self.law().material::<D, P>(&[moduli], &body, &operator.weights);
+        // How incomplete families are says nothing of what they are made of.
+        let mut on = On { body: &body, operator: &operator, failure: None, exec: &mut Exec::default() };
+        let surface = surface_effect(&*material, &mut on, &scaling);
+        let mut density = Density::same(reference.density);
+        if let Some(composition) = &composition {
+            density = Density::by_slot(&composition.density);
+            if solid.is_none() {
+                operator.weights.heterogeneity = self.heterogeneity(&body, composition, &reference);
+            } else {
+                let of = |slot: usize| {
+                    let young = composition.young[slot];
+                    if young > 0.0 { Moduli::new(hypothesis, young, composition.poisson(slot)) } else { moduli }
+                };
+                let by_slot: Vec<Moduli> = (0..body.cloud.n_slots()).map(of).collect();
+                if by_slot.iter().any(|other| *other != moduli) {
+                    material = self.law().material::<D, P>(&by_slot, &body, &operator.weights);
+                }
+            }
+        }
+        let mut elasticity = Elasticity::new(body, operator, material, reference.density, failure);
+        elasticity.density = density;
+        if let Some(composition) = &composition {
+            elasticity.materials.clone_from(&composition.material);
+        }
         for crack in &cracks {
             elasticity.cut(crack, tolerance);
         }
@@ -245,9 +276,12 @@ impl<const D: usize> Builder<'_, D> {
                 self.load(k, load, &body.cloud, shape.as_ref(), &slots, &mut terms)?;
             }
         }
-        let bar_speed = (parameters.young / parameters.density).sqrt();
+        let materials = self.summaries(&mut elasticity, composition.as_ref(), &reference, hypothesis);
+        // A crack is no faster than in the fastest material, and the slowest needs the longest τ.
+        let speeds = || materials.iter().map(|material| material.bar_speed);
+        let (bar_speed, slowest) = (speeds().fold(0.0, f64::max), speeds().fold(f64::INFINITY, f64::min));
         if let Some(settings) = settings {
-            elasticity = self.hybridise(settings, elasticity, solid, &scaling, horizon / bar_speed)?;
+            elasticity = self.hybridise(settings, elasticity, solid, &scaling, horizon / slowest)?;
         }
         let stable_step = elasticity.stable_step().min(finest_step);
         let smallest = elasticity.failure.as_ref().map(CriticalStretch::smallest).filter(|s| s.is_finite());
@@ -260,11 +294,9 @@ impl<const D: usize> Builder<'_, D> {
             spacing: 0.0,
             stable_step,
             bar_speed,
-            rayleigh_speed: match &solid {
-                Some(solid) => solid.rayleigh_speed(parameters.density),
-                None => moduli::rayleigh_speed(hypothesis, parameters.young, parameters.density),
-            },
+            rayleigh_speed: materials.iter().filter_map(|m| m.rayleigh_speed).reduce(f64::max),
             micromodulus: strength,
+            materials: if composition.is_some() { materials } else { Vec::new() },
             critical_stretch: smallest,
             surface,
             memory: 0,

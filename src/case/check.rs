@@ -1,5 +1,7 @@
 //! Rules across keys: what one key alone cannot tell. Each mistake is located at the key that has to change.
 
+mod materials;
+
 use std::collections::BTreeSet;
 
 use super::diagnostics::Diagnostic;
@@ -71,7 +73,8 @@ impl Checker<'_> {
         }
         let elasticity = &case.physics.elasticity;
         let path = format!("physics.elasticity.law.{}", elasticity.law.of().name());
-        self.law(&elasticity.law, dimension, &path);
+        self.law(&elasticity.law, dimension, &path, !elasticity.materials.is_empty());
+        materials::check(self, case, &mut used);
         if elasticity.law.of().is_state_based() {
             self.state_based(case);
         }
@@ -405,8 +408,23 @@ impl Checker<'_> {
         }
     }
 
-    fn law(&mut self, kind: &Law, dimension: usize, path: &str) {
+    /// `elsewhere`: the values are those of materials.
+    fn law(&mut self, kind: &Law, dimension: usize, path: &str, elsewhere: bool) {
         let law = kind.parameters();
+        for (key, given) in [("young", law.young), ("density", law.density)] {
+            if given.is_none() && law.material.is_none() && !elsewhere {
+                let message = format!("missing key `{key}`");
+                let help = format!("add `{key} = <number>`, or take both from the library: `material = \"PMMA\"`");
+                self.error(path, message, &help);
+            } else if given.is_some() && elsewhere {
+                let message = format!("each of the materials has its own `{key}`");
+                self.error(&format!("{path}.{key}"), message, "give it in `[materials.<name>]`");
+            }
+        }
+        if law.material.is_some() && elsewhere {
+            let message = "the materials of this body are named in `physics.elasticity.materials`";
+            self.error(&format!("{path}.material"), message, "give it in `[materials.<name>]`");
+        }
         if law.plane.is_some() && dimension != 2 {
             self.error(
                 &format!("{path}.plane"),
@@ -415,7 +433,12 @@ impl Checker<'_> {
             );
         }
         if kind.of().is_state_based() {
-            return self.poisson(law.poisson, law.plane, dimension, path);
+            // That of several materials is asked for one by one.
+            if !elsewhere {
+                let library = law.material.filter(|_| dimension > 1).map(|material| material.values().poisson);
+                self.poisson(law.poisson.or(library), law.plane, dimension, path);
+            }
+            return;
         }
         if let Some(poisson) = law.poisson {
             let (fixed, name, why) = match (dimension, law.plane) {
@@ -503,12 +526,18 @@ impl Checker<'_> {
         used: &mut BTreeSet<&'a str>,
     ) {
         let path = "physics.elasticity.failure.critical_stretch";
-        self.either(
-            path,
-            ("fracture_energy", failure.fracture_energy.is_some()),
-            ("stretch", failure.stretch.is_some()),
-            "fracture_energy = \"3.8 J/m^2\"",
-        );
+        // Materials may have their own.
+        let elasticity = &case.physics.elasticity;
+        let own = !elasticity.materials.is_empty()
+            || elasticity.law.parameters().material.is_some_and(|material| material.values().fracture_energy.is_some());
+        if !own || failure.fracture_energy.is_some() && failure.stretch.is_some() {
+            self.either(
+                path,
+                ("fracture_energy", failure.fracture_energy.is_some()),
+                ("stretch", failure.stretch.is_some()),
+                "fracture_energy = \"3.8 J/m^2\"",
+            );
+        }
         for (k, name) in failure.no_fail.iter().enumerate() {
             self.set_name(name, case, imported, &format!("{path}.no_fail[{k}]"), used);
         }
@@ -536,10 +565,12 @@ impl Checker<'_> {
         used: &mut BTreeSet<&'a str>,
     ) {
         used.insert(name);
-        if name == "all" || case.sets.contains_key(name) || imported {
+        let materials = &case.physics.elasticity.materials;
+        if name == "all" || case.sets.contains_key(name) || materials.contains_key(name) || imported {
             return;
         }
-        let names: Vec<&str> = case.sets.keys().map(String::as_str).chain(["all"]).collect();
+        let names = case.sets.keys().chain(materials.keys().filter(|name| !case.sets.contains_key(*name)));
+        let names: Vec<&str> = names.map(String::as_str).chain(["all"]).collect();
         let help = nearest(name, names.iter().copied()).map_or(String::new(), |n| format!("did you mean `{n}`?"));
         self.error(path, format!("no set has this name; sets: {}", names.join(", ")), &help);
     }

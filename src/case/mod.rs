@@ -6,6 +6,7 @@ mod check;
 mod constants;
 pub mod diagnostics;
 pub mod import;
+pub mod library;
 pub mod model;
 pub mod read;
 mod schema;

@@ -6,6 +6,7 @@
 
 mod discretization;
 mod geometry;
+mod materials;
 mod output;
 mod physics;
 mod solver;
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 pub use discretization::*;
 pub use geometry::*;
+pub use materials::*;
 pub use output::*;
 pub use physics::*;
 pub use solver::*;
@@ -34,6 +36,9 @@ pub struct Case {
     pub discretization: Discretization,
     /// Cells of several sizes, from the start or as the solution wants them.
     pub refinement: Option<Refinement>,
+    /// What parts of the body are made of, by name; the physics says where.
+    #[serde(default)]
+    pub materials: BTreeMap<String, Material>,
     pub physics: Physics,
     /// What acts on the body.
     #[serde(default)]

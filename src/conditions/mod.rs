@@ -7,6 +7,7 @@ pub mod initial;
 pub mod load;
 pub mod prescribed;
 pub mod profile;
+pub mod random;
 
 pub use load::Load;
 pub use prescribed::{Prescribed, Quantity};

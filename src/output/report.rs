@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::output::source::MaterialSummary;
 use crate::physics::elasticity::surface::SurfaceEffect;
 use crate::solver::statics::LoadStep;
 
@@ -25,7 +26,9 @@ pub struct Report {
     /// m
     pub horizon: f64,
     pub spacing: f64,
-    /// N/m⁶ in 3D, N/m⁵ in 2D, N/m⁴ in 1D
+    /// Of a body of several materials; else empty.
+    pub materials: Vec<MaterialSummary>,
+    /// Of the first material: N/m⁶ in 3D, N/m⁵ in 2D, N/m⁴ in 1D
     pub micromodulus: f64,
     /// The smallest of the body; null if bonds never break.
     pub critical_stretch: Option<f64>,

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::field::{Field, Values};
 use crate::physics::elasticity::Work;
@@ -87,13 +88,34 @@ pub struct BodySummary {
     pub bar_speed: f64,
     /// m/s; None in 1D.
     pub rayleigh_speed: Option<f64>,
-    /// Micromodulus and smallest critical stretch.
+    /// Where there are several.
+    pub materials: Vec<MaterialSummary>,
+    /// Micromodulus (of the first of several materials) and smallest critical stretch.
     pub micromodulus: f64,
     pub critical_stretch: Option<f64>,
     /// How incomplete families are at the start, corrected if asked.
     pub surface: SurfaceEffect,
     /// Bytes that fields and bonds take.
     pub memory: u64,
+}
+
+/// What is known of a material before the first step; where its values vary, the fastest waves and the smallest step and critical
+/// stretch.
+#[derive(Debug, Clone, Serialize, PartialEq)]
+pub struct MaterialSummary {
+    pub name: String,
+    pub points: usize,
+    /// m³; m² in 2D, m in 1D.
+    pub volume: f64,
+    /// √(E/ρ), m/s; then of longitudinal, shear and Rayleigh waves, the last two None in 1D.
+    pub bar_speed: f64,
+    pub longitudinal_speed: f64,
+    pub shear_speed: Option<f64>,
+    pub rayleigh_speed: Option<f64>,
+    /// s
+    pub stable_step: f64,
+    /// None: bonds inside never break.
+    pub critical_stretch: Option<f64>,
 }
 
 /// Where the material points are now: reference positions plus `factor` times the displacement, m.

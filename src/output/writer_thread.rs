@@ -184,6 +184,7 @@ mod tests {
             stable_step: 1.0,
             bar_speed: 1.0,
             rayleigh_speed: None,
+            materials: Vec::new(),
             micromodulus: 1.0,
             critical_stretch: None,
             surface: SurfaceEffect::default(),

@@ -135,7 +135,10 @@ impl<const D: usize> Builder<'_, D> {
             })
             .collect();
         let path = "physics.elasticity.failure.critical_stretch";
-        CriticalStretch::new(cloud, stretch(failure.fracture_energy, failure.stretch), &rules, &failure.no_fail)
+        let library = self.case.value.physics.elasticity.law.parameters().material;
+        let library = library.and_then(|material| material.values().fracture_energy);
+        let energy = failure.fracture_energy.or(library.filter(|_| failure.stretch.is_none()));
+        CriticalStretch::new(cloud, stretch(energy, failure.stretch), &rules, &failure.no_fail)
             .map(Some)
             .map_err(|e| self.refuse(path, format!("failure rules: {e}"), ""))
     }

@@ -5,7 +5,7 @@ use super::Builder;
 use crate::discretization::collocation::stability::{Law, bearable_in_motion};
 use crate::discretization::collocation::{SharedRow, SharedSlope};
 use crate::discretization::moments::ball_moment;
-use crate::discretization::{BondWeighting, Collocation, Regions};
+use crate::discretization::{BondWeighting, Collocation, Operator, Regions};
 use crate::error::{Error, Result};
 use crate::execution::{Limits, Packs};
 use crate::family::{Body, Families};
@@ -27,7 +27,7 @@ impl<const D: usize> Builder<'_, D> {
         scaling: &BondWeighting,
         unit: f64,
     ) -> Result<Elasticity<D, P>> {
-        let (body, density, failure) = (&elasticity.body, elasticity.density.unit, &elasticity.failure);
+        let (body, failure) = (&elasticity.body, &elasticity.failure);
         let Arrangement::Lattice(lattice) = &body.cloud.arrangement else {
             return Err(self.refuse(PATH, "the hybrid scheme is for lattices", ""));
         };
@@ -42,15 +42,21 @@ impl<const D: usize> Builder<'_, D> {
                 Law::StateBased { influence, micromodulus, volumetric }
             }
         };
+        let varied = elasticity.operator.weights.heterogeneity.as_deref();
+        let softest = elasticity.density.least_per_constant(varied, &body.cloud.slots);
         // Noise may grow tenfold in the run.
         let end_time = self.case.value.solver.stages().map(|(_, solver)| solver.end_time()).fold(0.0, f64::max);
-        let bearable = bearable_in_motion(end_time, density);
+        let bearable = bearable_in_motion(end_time, softest);
         let (fit, symbol) = collocation
             .marched::<D>(lattice.spacing, scaling.horizon, &kernel, bearable)
             .map_err(|error| self.refuse(PATH, error.to_string(), "leave out `order`, `points` and `exponent`"))?;
         let weights = fit.elastic(&scaling.influence, scaling.strength);
-        let row = SharedRow::new(lattice, &fit, &weights).map_err(refuse)?;
+        let mut row = SharedRow::new(lattice, &fit, &weights).map_err(refuse)?;
         let standard = self.standard_from_the_start(settings, body)?;
+        // Rows are of one constant: where materials meet, bonds are summed.
+        row.heterogeneity.clone_from(&elasticity.operator.weights.heterogeneity);
+        let mixed = row.heterogeneity.as_ref().map(|varied| varied.mixed(body, &elasticity.state.states));
+        let standard = standard.chain(mixed.unwrap_or_default());
         let regions = Regions::new(body, &elasticity.state.states, standard, settings.buffer);
         if regions.collocated_points() == 0 {
             let message = "every point is near a boundary, a pre-crack or a named set: all sum their bonds";
@@ -113,9 +119,9 @@ impl<const D: usize> Builder<'_, D> {
 
 /// Scales the weights of a lattice so that Σ w |ξ| is the integral ∫ c ω |ξ| dV, to which the energy of expansion and the mean
 /// stiffness over all directions are proportional.
-pub(super) fn rescale<const D: usize, P: Packs>(elasticity: &mut Elasticity<D, P>, scaling: &BondWeighting) {
-    let Families::Lattice(families) = &elasticity.body.families else { return };
-    let weights = &mut elasticity.operator.weights.by_offset;
+pub(super) fn rescale<const D: usize>(body: &Body<D>, operator: &mut Operator, scaling: &BondWeighting) {
+    let Families::Lattice(families) = &body.families else { return };
+    let weights = &mut operator.weights.by_offset;
     let sum: f64 = families.offsets.iter().zip(&*weights).map(|(offset, weight)| weight * offset.length).sum();
     let integral = scaling.strength * ball_moment(&scaling.influence, [0; D], -1.0, scaling.horizon);
     weights.iter_mut().for_each(|weight| *weight *= integral / sum);

@@ -1,8 +1,12 @@
 //! Tables of the physics: laws and failure.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Interface;
+use crate::case::library::LibraryMaterial;
 use crate::physics::elasticity::laws;
 
 /// What the body is made of.
@@ -17,6 +21,12 @@ pub struct Physics {
 #[serde(deny_unknown_fields)]
 pub struct Elasticity {
     pub law: Law,
+    /// Where each of `[materials]` is: its name and a set. Every point is in exactly one of these sets.
+    #[serde(default)]
+    pub materials: BTreeMap<String, String>,
+    /// What lies between two of them.
+    #[serde(default)]
+    pub interfaces: Vec<Interface>,
     /// Without it, bonds never break.
     pub failure: Option<Failure>,
 }
@@ -50,21 +60,22 @@ laws::each_law!(define);
 /// What all laws are given.
 #[derive(Debug, Clone)]
 pub struct Parameters {
-    pub young: f64,
-    pub density: f64,
+    pub material: Option<LibraryMaterial>,
+    pub young: Option<f64>,
+    pub density: Option<f64>,
     pub poisson: Option<f64>,
     pub plane: Option<Plane>,
 }
 
 impl From<BondBased> for Parameters {
-    fn from(BondBased { young, density, poisson, plane }: BondBased) -> Self {
-        Parameters { young, density, poisson, plane }
+    fn from(BondBased { material, young, density, poisson, plane }: BondBased) -> Self {
+        Parameters { material, young, density, poisson, plane }
     }
 }
 
 impl From<StateBased> for Parameters {
-    fn from(StateBased { young, density, poisson, plane }: StateBased) -> Self {
-        Parameters { young, density, poisson, plane }
+    fn from(StateBased { material, young, density, poisson, plane }: StateBased) -> Self {
+        Parameters { material, young, density, poisson, plane }
     }
 }
 
@@ -72,12 +83,14 @@ impl From<StateBased> for Parameters {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BondBased {
-    /// Young's modulus E.
+    /// Of the library: its values stand where this table gives none.
+    pub material: Option<LibraryMaterial>,
+    /// Young's modulus E. Here or in `[materials]`.
     #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0))]
-    pub young: f64,
-    /// Density ρ.
+    pub young: Option<f64>,
+    /// Density ρ. Here or in `[materials]`.
     #[schemars(extend("x-unit" = "kg/m^3", "exclusiveMinimum" = 0))]
-    pub density: f64,
+    pub density: Option<f64>,
     /// May be given, but the theory fixes it: 1/3 in plane stress, 1/4 in plane strain and in 3D.
     pub poisson: Option<f64>,
     /// 2D only: plane stress (default) or plane strain.
@@ -89,12 +102,14 @@ pub struct BondBased {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateBased {
-    /// Young's modulus E.
+    /// Of the library: its values stand where this table gives none.
+    pub material: Option<LibraryMaterial>,
+    /// Young's modulus E. Here or in `[materials]`.
     #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0))]
-    pub young: f64,
-    /// Density ρ.
+    pub young: Option<f64>,
+    /// Density ρ. Here or in `[materials]`.
     #[schemars(extend("x-unit" = "kg/m^3", "exclusiveMinimum" = 0))]
-    pub density: f64,
+    pub density: Option<f64>,
     /// Poisson's ratio ν: above -1 and below 1/2, in plane stress below 1. Needed in 2D and 3D; in 1D there is none.
     #[schemars(extend("x-unit" = ""))]
     pub poisson: Option<f64>,
@@ -122,7 +137,7 @@ pub enum Failure {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CriticalStretch {
-    /// G₀: energy to open a unit of crack area. Either this or `stretch`.
+    /// G₀: energy to open a unit of crack area. Either this or `stretch`; neither where `[materials]` say it.
     #[schemars(extend("x-unit" = "J/m^2", "exclusiveMinimum" = 0))]
     pub fracture_energy: Option<f64>,
     /// s₀. Either this or `fracture_energy`.

@@ -7,6 +7,7 @@
 //! the means of its parts. A bond between new points is broken if on the way from one to the other it passes between two
 //! old cells whose bond was broken, or through a pre-crack.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{Elasticity, Physics, Replaced};
@@ -274,10 +275,16 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         });
         self.adapted.bonds[0] += fresh.into_inner();
         self.adapted.bonds[1] += families.neighbours.len() as u64;
-        let operator = adaptation.scaling.operator(&body, &update, Some((&self.operator, &self.body)), None);
+        let mut operator = adaptation.scaling.operator(&body, &update, Some((&self.operator, &self.body)), None);
+        let from: Vec<usize> = origins.iter().map(|origin| origin.cell()).collect();
         if let Some(failure) = &self.failure {
-            let inherited = failure.inherited(origins.iter().map(|origin| origin.cell()));
-            self.failure = Some(inherited.scaled(&horizons, adaptation.scaling.horizon));
+            self.failure = Some(failure.inherited(&from).scaled(&horizons, adaptation.scaling.horizon));
+        }
+        let varied = self.operator.weights.heterogeneity.as_ref();
+        operator.weights.heterogeneity = varied.map(|varied| Arc::new(varied.inherited(&body, &from)));
+        self.density = self.density.inherited(&from);
+        if !self.materials.is_empty() {
+            self.materials = from.iter().map(|&old| self.materials[old]).collect();
         }
         let cloud = &mut body.cloud;
         let n = origins.len();

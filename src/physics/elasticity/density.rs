@@ -1,5 +1,6 @@
 //! ρ of a body: one number, or one by point where materials differ.
 
+use crate::discretization::Heterogeneity;
 use crate::field::Number;
 
 /// Densities, in the numbers of the fields that they divide.
@@ -45,6 +46,15 @@ impl<F: Number> Density<F> {
         }
         let ratio = |(slot, &number): (usize, &f64)| if number > 0.0 { self.at(slot) / number } else { f64::INFINITY };
         numbers.iter().enumerate().map(ratio).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The smallest of ρ over c/c₀ at these slots: what is slowest to follow.
+    pub fn least_per_constant(&self, varied: Option<&Heterogeneity>, slots: &[u32]) -> f64 {
+        let Some(varied) = varied else {
+            return slots.iter().map(|&slot| self.at(slot as usize)).fold(f64::INFINITY, f64::min);
+        };
+        let ratio = |&slot: &u32| self.at(slot as usize) / varied.relative(slot as usize);
+        slots.iter().map(ratio).fold(f64::INFINITY, f64::min)
     }
 
     /// For points of which each is of the material of one before: `from` by slot.

@@ -287,14 +287,7 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
     fn stable_step(&self, on: &mut On<'_, D>, density: &Density<P::Field>) -> f64 {
         let bonds = self.inner.stable_step(on, density);
         let damped = |square: f64| (self.damping.powi(2) + square).sqrt() - self.damping;
-        let softest = match &self.row.heterogeneity {
-            None if density.is_same() => density.unit,
-            varied => {
-                let relative = |slot: &u32| varied.as_ref().map_or(1.0, |varied| varied.relative(*slot as usize));
-                let ratio = |slot: &u32| density.at(*slot as usize) / relative(slot);
-                on.body.cloud.slots.iter().map(ratio).fold(f64::INFINITY, f64::min)
-            }
-        };
+        let softest = density.least_per_constant(self.row.heterogeneity.as_deref(), &on.body.cloud.slots);
         let rows = damped(4.0 * softest / self.radius);
         rows.min(if self.damps_bonds { damped(bonds * bonds) } else { bonds })
     }

@@ -253,6 +253,10 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
         self.pull::<D, P>(on, states, u, &self.dilatation_force[0], force);
     }
 
+    fn relative_stiffness(&self, _: &BondWeights, slot: usize) -> f64 {
+        self.moduli(slot).deviatoric / self.moduli[0].deviatoric
+    }
+
     fn dilatation_force(&mut self) -> Option<&mut Vec<P::Field>> {
         Some(&mut self.dilatation_force[0])
     }

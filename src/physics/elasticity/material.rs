@@ -106,6 +106,10 @@ pub trait Material<const D: usize, P: Packs>: Send + Sync {
     /// Energy densities of unit strain over those of a complete family.
     fn shares(&self, on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares;
 
+    /// c/c₀ of the bonds inside the material of a slot over those that the weights are made for.
+    fn relative_stiffness(&self, weights: &BondWeights, slot: usize) -> f64 {
+        weights.heterogeneity.as_ref().map_or(1.0, |varied| varied.relative(slot))
+    }
     /// Where points sum their bonds, by slot: 1, and 0 where they have a row.
     fn scheme(&self, _slot: usize) -> f64 {
         1.0

@@ -43,6 +43,8 @@ pub struct Elasticity<const D: usize, P: Packs = Double> {
     pub body: Body<D>,
     pub operator: Operator,
     pub density: Density<P::Field>,
+    /// Number of the material of each slot; empty where there is one.
+    pub materials: Vec<u8>,
     /// None: bonds never break.
     pub failure: Option<CriticalStretch>,
     pub material: Box<dyn Material<D, P>>,
@@ -104,6 +106,7 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
             body,
             operator,
             density: Density::same(density),
+            materials: Vec::new(),
             failure,
             material,
             n_bonds: state.states.count(),
@@ -192,6 +195,17 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
             let density = body.energy_density();
             Values::Scalar(gather(slots, &|slot| density[slot].to_f64()))
         }),
+        (info("material", "", "number of the material, from 0 in the order of their names"), |body, slots| {
+            Values::Scalar(gather(slots, &|slot| body.materials.get(slot).map_or(0.0, |k| f64::from(*k))))
+        }),
+        (info("density", "kg/m³", "ρ"), |body, slots| Values::Scalar(gather(slots, &|slot| body.density.at(slot)))),
+        (
+            info("relative_stiffness", "", "c/c₀: what bonds inside are of those of the first material"),
+            |body, slots| {
+                let weights = &body.operator.weights;
+                Values::Scalar(gather(slots, &|slot| body.material.relative_stiffness(weights, slot)))
+            },
+        ),
         (info("scheme", "", "1 where bonds are summed, 0 where a point has a row of collocation"), |body, slots| {
             Values::Scalar(gather(slots, &|slot| body.material.scheme(slot)))
         }),
@@ -482,7 +496,8 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
         let cloud = &self.body.cloud;
         let fields = (3 * D + 1) * size_of::<P::Field>() * cloud.n_slots()
             + size_of_val(&cloud.slots[..])
-            + size_of_val(&self.density.relative[..]);
+            + size_of_val(&self.density.relative[..])
+            + self.materials.len();
         let classes = self.failure.as_ref().map_or(0, CriticalStretch::memory);
         let points = match &cloud.arrangement {
             Arrangement::Lattice(_) => 0,

@@ -11,8 +11,11 @@ pub struct CriticalStretch {
     /// Class of each slot; empty when all points are alike.
     classes: Vec<u8>,
     n_classes: usize,
-    /// s₀ of a bond between two classes, row by row; infinite where bonds never break.
+    /// s₀ of a bond between two classes, row by row; infinite where bonds never break, NaN where that is the smaller of what
+    /// both ends have.
     table: Vec<f64>,
+    /// s₀ by slot, of the material there; empty where no pair of classes leaves it to the ends.
+    own: Vec<f64>,
     smallest: f64,
     /// √(δ₀/δ) of each slot; empty when horizons are alike.
     scales: Vec<f64>,
@@ -33,6 +36,7 @@ impl CriticalStretch {
             classes: Vec::new(),
             n_classes: 1,
             table: vec![stretch],
+            own: Vec::new(),
             smallest: stretch,
             scales: Vec::new(),
         }
@@ -88,7 +92,24 @@ impl CriticalStretch {
             }
         }
         let smallest = table.iter().copied().fold(f64::INFINITY, f64::min);
-        Ok(CriticalStretch { classes, n_classes: combinations.len(), table, smallest, scales: Vec::new() })
+        let (n_classes, own, scales) = (combinations.len(), Vec::new(), Vec::new());
+        Ok(CriticalStretch { classes, n_classes, table, own, smallest, scales })
+    }
+
+    /// As [`CriticalStretch::new`] for a body of several materials: where no rule speaks, s₀ of a bond is the smaller of `own` of
+    /// its ends, by slot; infinite where bonds never break.
+    pub fn by_material<const D: usize>(
+        cloud: &Cloud<D>,
+        own: Vec<f64>,
+        rules: &[PairRule],
+        no_fail: &[String],
+    ) -> Result<Self, String> {
+        let mut found = Self::new(cloud, f64::NAN, rules, no_fail)?;
+        // `min` passes over what is not a number.
+        let least = cloud.slots.iter().map(|&slot| own[slot as usize]).fold(f64::INFINITY, f64::min);
+        found.smallest = found.table.iter().copied().fold(least, f64::min);
+        found.own = own;
+        Ok(found)
     }
 
     /// The same fracture energy where horizons differ: s₀ goes with 1/√δ, and a bond takes the mean of its ends. `horizons`
@@ -96,14 +117,20 @@ impl CriticalStretch {
     pub fn scaled(mut self, horizons: &[f64], horizon: f64) -> Self {
         self.scales = horizons.iter().map(|delta| (horizon / delta).sqrt()).collect();
         let least = self.scales.iter().copied().fold(f64::INFINITY, f64::min);
-        self.smallest = self.table.iter().copied().fold(f64::INFINITY, f64::min) * least;
+        self.smallest *= least;
         self
     }
 
     /// The rule for other points, each of the class of one before: `from` by slot.
-    pub fn inherited(&self, from: impl Iterator<Item = usize>) -> Self {
-        let classes = if self.classes.is_empty() { Vec::new() } else { from.map(|old| self.classes[old]).collect() };
-        CriticalStretch { classes, scales: Vec::new(), ..self.clone() }
+    pub fn inherited(&self, from: &[usize]) -> Self {
+        let classes =
+            if self.classes.is_empty() { Vec::new() } else { from.iter().map(|&k| self.classes[k]).collect() };
+        let own = if self.own.is_empty() { Vec::new() } else { from.iter().map(|&k| self.own[k]).collect() };
+        // Without scales again.
+        let least = own.iter().copied().fold(f64::INFINITY, f64::min);
+        let smallest = self.table.iter().copied().fold(least, f64::min);
+        let (table, n_classes) = (self.table.clone(), self.n_classes);
+        CriticalStretch { classes, n_classes, table, own, smallest, scales: Vec::new() }
     }
 
     /// Which rule speaks at a slot.
@@ -119,17 +146,20 @@ impl CriticalStretch {
     /// s₀ of the bond between two slots.
     #[inline]
     pub fn of(&self, here: usize, there: usize) -> f64 {
-        let stretch = if self.classes.is_empty() {
+        let mut stretch = if self.classes.is_empty() {
             self.table[0]
         } else {
             self.table[self.classes[here] as usize * self.n_classes + self.classes[there] as usize]
         };
+        if stretch.is_nan() {
+            stretch = self.own[here].min(self.own[there]);
+        }
         if self.scales.is_empty() { stretch } else { stretch * (0.5 * (self.scales[here] + self.scales[there])) }
     }
 
     /// Bytes that the classes take.
     pub fn memory(&self) -> usize {
-        self.classes.len() + size_of_val(&self.scales[..])
+        self.classes.len() + size_of_val(&self.scales[..]) + size_of_val(&self.own[..])
     }
 }
 
@@ -149,6 +179,10 @@ mod tests {
         assert_eq!((s.of(0, 1), s.of(1, 2), s.of(2, 1), s.of(2, 2)), (0.2, 0.05, 0.05, 0.1));
         assert_eq!((s.of(3, 2), s.of(0, 3)), (f64::INFINITY, f64::INFINITY));
         assert_eq!(s.smallest(), 0.05);
+        let own = vec![0.3, 0.4, 0.02, f64::INFINITY];
+        let s = CriticalStretch::by_material(&cloud, own, &[rule("left", "right", 0.05)], &[]).unwrap();
+        assert_eq!((s.of(0, 1), s.of(1, 0), s.of(1, 2), s.of(2, 3), s.of(3, 3)), (0.3, 0.3, 0.05, 0.02, f64::INFINITY));
+        assert_eq!(s.smallest(), 0.02);
         assert_eq!(CriticalStretch::new(&cloud, 0.1, &[], &["gripp".into()]).unwrap_err(), "gripp");
     }
 }

@@ -1,0 +1,132 @@
+//! Rules of materials and of what lies between them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::super::model::{Case, Plane, Scheme};
+use super::Checker;
+use crate::expression::nearest;
+
+/// Everything that is wrong with the materials of a case by its text alone; whether every point has one is seen by the points.
+pub(super) fn check<'a>(checker: &mut Checker<'_>, case: &'a Case, used: &mut BTreeSet<&'a str>) {
+    let elasticity = &case.physics.elasticity;
+    let (dimension, law) = (case.case.dimension, elasticity.law.of());
+    let imported = case.geometry.points.is_some();
+    let names = || case.materials.keys().map(String::as_str);
+    let unknown = |name: &str| {
+        let help = nearest(name, names()).map_or(String::new(), |n| format!("did you mean `{n}`?"));
+        (format!("no material has this name; materials: {}", names().collect::<Vec<_>>().join(", ")), help)
+    };
+    for (name, set) in &elasticity.materials {
+        let path = format!("physics.elasticity.materials.{name}");
+        if !case.materials.contains_key(name) {
+            let (message, help) = unknown(name);
+            checker.error(&path, message, &help);
+        }
+        if name == "all" || case.sets.contains_key(name) && set != name {
+            let message = "a material is a set of this name, and there is one of other points";
+            checker.error(&path, message, "rename one of them, or let the material be that set");
+        }
+        if elasticity.materials.contains_key(set) && set != name {
+            let message = format!("`{set}` is a material, and a point is of one material only");
+            checker.error(&path, message, "name a set");
+        } else if set == name && !case.sets.contains_key(set) && !imported {
+            checker.error(&path, format!("there is no set `{set}`"), "add it to `[sets]`");
+        } else {
+            checker.set_name(set, case, imported, &path, used);
+        }
+    }
+    if elasticity.materials.len() > 200 {
+        checker.error("physics.elasticity.materials", "a body has at most 200 materials", "");
+    }
+    for (name, material) in &case.materials {
+        let path = format!("materials.{name}");
+        if !elasticity.materials.contains_key(name) {
+            checker.warning(
+                &path,
+                "this material is defined but is nowhere: `physics.elasticity.materials` does not name it",
+            );
+            continue;
+        }
+        for (key, given) in [("young", material.young.is_some()), ("density", material.density.is_some())] {
+            if !given && material.material.is_none() {
+                let help =
+                    format!("add `{key} = <number or formula>`, or take both from the library: `material = \"PMMA\"`");
+                checker.error(&path, format!("missing key `{key}`"), &help);
+            }
+        }
+        if material.fracture_energy.is_some() && material.critical_stretch.is_some() {
+            let message = "`fracture_energy` and `critical_stretch` are both given; only one may be";
+            checker.error(&format!("{path}.critical_stretch"), message, "remove one of them");
+        }
+        let breaks = material.fracture_energy.is_some() || material.critical_stretch.is_some();
+        if breaks && elasticity.failure.is_none() {
+            let message = "bonds never break: `physics.elasticity.failure` is missing";
+            checker.error(&path, message, "add `failure = { critical_stretch = {} }` to `[physics.elasticity]`");
+        }
+        let parameters = elasticity.law.parameters();
+        let library = material.material.filter(|_| dimension > 1).map(|material| material.values().poisson);
+        if law.is_state_based() {
+            let poisson = material.poisson.or(parameters.poisson).or(library);
+            checker.poisson(poisson, parameters.plane, dimension, &path);
+        } else if let Some(poisson) = material.poisson {
+            let fixed = match (dimension, parameters.plane) {
+                (1, _) => None,
+                (2, Some(Plane::Strain)) | (3, _) => Some((1.0 / 4.0, "1/4")),
+                _ => Some((1.0 / 3.0, "1/3")),
+            };
+            // 1e-3 lets 0.333 stand for 1/3.
+            if fixed.is_none_or(|(fixed, _)| (poisson - fixed).abs() > 1e-3) {
+                let message = match fixed {
+                    Some((_, name)) => format!("the bond-based law fixes the Poisson ratio at {name}"),
+                    None => "in 1D there is no Poisson ratio".into(),
+                };
+                checker.error(&format!("{path}.poisson"), message, "remove the key, or give that value");
+            }
+        }
+    }
+    let mut pairs: BTreeMap<[&str; 2], usize> = BTreeMap::new();
+    for (k, interface) in elasticity.interfaces.iter().enumerate() {
+        let path = format!("physics.elasticity.interfaces[{k}]");
+        for (i, name) in interface.between.iter().enumerate() {
+            if !elasticity.materials.contains_key(name) {
+                let (message, help) = unknown(name);
+                checker.error(&format!("{path}.between[{i}]"), message, &help);
+            }
+        }
+        let [Some(a), Some(b)] = [interface.between.first(), interface.between.get(1)] else { continue };
+        if a == b {
+            let message = "an interface lies between two materials";
+            checker.error(
+                &format!("{path}.between"),
+                message,
+                &format!("give what is inside `{a}` in `[materials.{a}]`"),
+            );
+        }
+        let pair = if a < b { [a.as_str(), b] } else { [b.as_str(), a] };
+        if let Some(first) = pairs.insert(pair, k) {
+            let message = format!("interfaces[{first}] is of these two materials too");
+            checker.error(&format!("{path}.between"), message, "say it once");
+        }
+        let [energy, stretch] = [interface.fracture_energy.is_some(), interface.stretch.is_some()];
+        if energy && stretch {
+            let message = "`fracture_energy` and `stretch` are both given; only one may be";
+            checker.error(&format!("{path}.stretch"), message, "remove one of them");
+        }
+        if (energy || stretch) && elasticity.failure.is_none() {
+            let message = "bonds never break: `physics.elasticity.failure` is missing";
+            checker.error(&path, message, "add `failure = { critical_stretch = {} }` to `[physics.elasticity]`");
+        }
+        if interface.young.is_some() && law.is_state_based() {
+            let message = "each end of a bond of a state-based solid pulls with its own moduli: there are none between";
+            checker.error(&format!("{path}.young"), message, "remove it, or use a bond-based law");
+        }
+        if !energy && !stretch && interface.young.is_none() {
+            checker.error(&path, "this interface says nothing", "add `fracture_energy`, `stretch` or `young`");
+        }
+    }
+    let several = elasticity.materials.len() > 1;
+    if several && law.is_state_based() && matches!(case.discretization.scheme, Scheme::Hybrid(_)) {
+        let message = "rows of the state-based law are of one material: its dilatation is carried from row to row";
+        checker.error("discretization.scheme.hybrid", message, "use a bond-based law, or `scheme = \"standard\"`");
+    }
+}
