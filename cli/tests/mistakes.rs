@@ -96,10 +96,25 @@ const SOLID: [(&str, &str); 5] = [
     ("at = [\"-5 mm\", 0.0]", "at = [\"-5 mm\", 0.0, 0.0]"),
 ];
 
+/// The good case of two materials.
+const TWO: [(&str, &str); 4] = [
+    ("[sets]", "[sets]\nleft = { where = \"x < 0\" }\nright = { where = \"x > 0\" }"),
+    (
+        "[physics.elasticity]",
+        "[materials.glass]\nmaterial = \"soda-lime glass\"\n\n[materials.steel]\nyoung = \"190 GPa\"\n\
+         density = \"8000 kg/m^3\"\nfracture_energy = \"20 kJ/m^2\"\n\n[physics.elasticity]\n\
+         materials = { glass = \"left\", steel = \"right\" }\n\
+         interfaces = [{ between = [\"glass\", \"steel\"], fracture_energy = \"1 J/m^2\" }]",
+    ),
+    ("young = \"72 GPa\", density = \"2440 kg/m^3\", ", ""),
+    ("fracture_energy = \"3.8 J/m^2\", ", ""),
+];
+
 fn mistakes() -> Vec<Mistake> {
     let patch = |name, old, new| Mistake::patch(name, &[(old, new)]);
     let load = |name, value: &str| Mistake::patch(name, &[(VALUE, &format!("value = {value}"))]);
     let solid = |name, more: &[(&str, &str)]| Mistake::patch(name, &[&SOLID, more].concat());
+    let two = |name, old, new| Mistake::patch(name, &[&TWO[..], &[(old, new)]].concat());
     let mut list = vec![
         // Keys and tables.
         patch("unknown_key", "young =", "youngs ="),
@@ -232,6 +247,45 @@ fn mistakes() -> Vec<Mistake> {
                 ("[solver.velocity_verlet]\nend_time = \"5 us\"\nsafety = 0.8", "[solver.newton]\nend_time = 1"),
             ],
         ),
+        // Materials.
+        two("point_of_two_materials", "left = { where = \"x < 0\" }", "left = { where = \"x < 1e-3\" }"),
+        two("point_of_no_material", "left = { where = \"x < 0\" }", "left = { where = \"x < -1e-3\" }"),
+        two("material_without_points", "left = { where = \"x < 0\" }", "left = { where = \"x < -1\" }"),
+        two("material_of_an_unknown_set", "glass = \"left\"", "glass = \"lift\""),
+        two("unknown_material", "glass = \"left\", steel", "glas = \"left\", steel"),
+        two("unknown_library_material", "\"soda-lime glass\"", "\"soda lime glass\""),
+        two("material_without_density", "density = \"8000 kg/m^3\"\n", ""),
+        two("material_nowhere", "steel = \"right\" }", "\"all\" = \"right\" }"),
+        two("material_with_a_negative_modulus", "young = \"190 GPa\"", "young = \"1e11*(x - 5e-3)\""),
+        two(
+            "material_with_a_wild_scatter",
+            "young = \"190 GPa\"",
+            "young = \"190 GPa\"\nrandom = { seed = 1, distribution = \"normal\", young = 0.9 }",
+        ),
+        two("material_with_two_toughnesses", "young = \"190 GPa\"", "young = \"190 GPa\"\ncritical_stretch = 0.1"),
+        two("material_named_like_another_set", "[sets]", "[sets]\nsteel = { where = \"y > 0\" }"),
+        two("law_with_the_values_of_materials", "bond_based = { ", "bond_based = { young = \"72 GPa\", "),
+        two("interface_of_an_unknown_material", "[\"glass\", \"steel\"]", "[\"glass\", \"stel\"]"),
+        two("interface_within_a_material", "[\"glass\", \"steel\"]", "[\"glass\", \"glass\"]"),
+        two(
+            "contradictory_interfaces",
+            "interfaces = [",
+            "interfaces = [{ between = [\"steel\", \"glass\"], stretch = 0.1 }, ",
+        ),
+        two("interface_of_two_toughnesses", "fracture_energy = \"1 J/m^2\"", "fracture_energy = 1, stretch = 0.1"),
+        two("interface_that_says_nothing", ", fracture_energy = \"1 J/m^2\"", ""),
+        Mistake::patch(
+            "law_that_cannot_be_hybrid",
+            &[
+                &TWO[..],
+                &[
+                    ("bond_based = {", "state_based = { poisson = 0.2,"),
+                    ("[discretization]", "[discretization]\nscheme = { hybrid = {} }"),
+                ],
+            ]
+            .concat(),
+        ),
+        patch("law_without_values", "young = \"72 GPa\", ", ""),
         // Constants.
         patch("constants_in_a_circle", "h = \"1 mm\"", "h = \"delta/3\"\ndelta = \"3*h\""),
         patch("constant_with_a_taken_name", "h = \"1 mm\"", "h = \"1 mm\"\nt = 3"),

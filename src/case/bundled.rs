@@ -23,7 +23,7 @@ macro_rules! bundled {
 }
 
 /// All of them, in the order in which a newcomer may look at them.
-pub const CASES: [Bundled; 14] = [
+pub const CASES: [Bundled; 17] = [
     bundled!("crack_branching", "2D: a crack runs through glass and branches; the main example"),
     bundled!("crack_branching_refined", "2D: the same crack on cells that are fine about its tips only"),
     bundled!("crack_branching_hybrid", "2D: a larger plate, collocation where it is whole and bonds where it breaks"),
@@ -34,6 +34,12 @@ pub const CASES: [Bundled; 14] = [
     bundled!("plate_with_hole", "2D: a plate with a hole is pulled slowly until it rests"),
     bundled!("stretched_plate", "2D: a plate with the Poisson ratio of aluminium is pulled; state-based"),
     bundled!("double_cantilever", "2D: a crack grows as a specimen is wedged open, in equilibrium all the way"),
+    bundled!(
+        "inclusion",
+        "2D: a stiff disc in a soft plate is strained evenly, and less than the plate; two materials"
+    ),
+    bundled!("laminate_delamination", "2D: two unlike layers are wedged apart; their interface gives way"),
+    bundled!("random_microstructure", "2D: a plate of scattered stiffness and toughness breaks where it is weak"),
     bundled!("kalthoff_winkler", "2D: a struck plate with two notches cracks at 70 degrees"),
     bundled!("fragmenting_cylinder", "3D: an expanding tube breaks into fragments; scattered points"),
     bundled!("kalthoff_winkler_3d", "3D: the struck plate with its thickness; large"),

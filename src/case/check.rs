@@ -411,10 +411,11 @@ impl Checker<'_> {
     /// `elsewhere`: the values are those of materials.
     fn law(&mut self, kind: &Law, dimension: usize, path: &str, elsewhere: bool) {
         let law = kind.parameters();
-        for (key, given) in [("young", law.young), ("density", law.density)] {
+        for (key, unit, given) in [("young", "Pa", law.young), ("density", "kg/m^3", law.density)] {
             if given.is_none() && law.material.is_none() && !elsewhere {
                 let message = format!("missing key `{key}`");
-                let help = format!("add `{key} = <number>`, or take both from the library: `material = \"PMMA\"`");
+                let help =
+                    format!("add `{key} = <number, {unit}>`, or take both from the library: `material = \"PMMA\"`");
                 self.error(path, message, &help);
             } else if given.is_some() && elsewhere {
                 let message = format!("each of the materials has its own `{key}`");

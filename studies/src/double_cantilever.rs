@@ -198,7 +198,7 @@ fn run(full: bool) -> Result<Outcome> {
 
 /// Bonds that cross a line along an axis of the lattice, per spacing: each of those with a part of their volume within the
 /// horizon, by the rows that it reaches across.
-fn crossing(m: f64) -> f64 {
+pub(super) fn crossing(m: f64) -> f64 {
     let n = m.ceil() as i32 + 1;
     let reach = |dx: i32, dy: i32| f64::from(dx * dx + dy * dy).sqrt() < m + 0.5 - 1e-9;
     (1..=n).map(|dy| dy * (-n..=n).filter(|dx| reach(*dx, dy)).count() as i32).sum::<i32>().into()

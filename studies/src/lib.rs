@@ -7,6 +7,7 @@ pub mod bar;
 mod constants;
 mod convergence;
 mod crack_branching;
+mod delamination;
 mod discrete_moduli;
 mod dispersion;
 mod double_cantilever;
@@ -18,6 +19,7 @@ mod hybrid_branching;
 mod hybrid_example_1;
 mod hybrid_example_2;
 mod hybrid_wave;
+mod inclusion;
 mod kirsch;
 mod navier;
 mod precision;
@@ -90,6 +92,8 @@ pub const STUDIES: &[Study] = &[
     precision::PRECISION,
     double_cantilever::STUDY,
     kirsch::STUDY,
+    inclusion::STUDY,
+    delamination::STUDY,
     convergence::STUDY,
     wave_interface::STUDY,
     refined_branching::STUDY,

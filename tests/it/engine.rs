@@ -1,7 +1,8 @@
 //! The fast loops against the plain one: every set of instructions, precision, form and path gives the sum that a scalar
 //! loop over bonds gives, and breaks the bonds that it breaks.
 
-use bondwise::discretization::{Influence, Operator, PartialVolume, standard};
+use bondwise::discretization::heterogeneity::PairTable;
+use bondwise::discretization::{Heterogeneity, Influence, Operator, PartialVolume, standard};
 use bondwise::execution::{BreakRule, Broken, Exec, Instructions, Packs, Unbreakable};
 use bondwise::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families, GROUP};
 use bondwise::field::{Double, Mixed, Number, Single};
@@ -34,6 +35,9 @@ impl<const D: usize, B: BondLaw<D>, const SMALL: bool, const EXACT: bool> BondKe
         (false, true) => -1.0,
         _ => B::SMALL,
     };
+    // As the program compiles it, in one of the forms.
+    const EVERY_STEP: bool = SMALL == EXACT;
+    const VARIED: bool = SMALL == EXACT;
     #[inline(always)]
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L {
         self.0.strain(bond, eta)
@@ -103,9 +107,23 @@ impl<const D: usize> Specimen<D> {
         Specimen { body, operator, states, displacement }
     }
 
+    /// Of bonds whose constants differ: c/c₀ by place, and what the bonds between both sides of x = 0 have more of it.
+    fn of(mut self, relative: impl Fn(&[f64; D]) -> f64, across: Option<f64>) -> Self {
+        let (mut by_slot, mut side) = (vec![0.0; self.body.cloud.n_slots()], vec![0; self.body.cloud.n_slots()]);
+        for &slot in &self.body.cloud.slots {
+            let x = self.body.cloud.position(slot as usize);
+            (by_slot[slot as usize], side[slot as usize]) = (relative(&x), u8::from(x[0] > 0.0));
+        }
+        let pairs = across.map(|t| PairTable { materials: side, factors: vec![1.0, t, t, 1.0], n: 2 });
+        self.operator.weights.heterogeneity = Some(Heterogeneity::new(&self.body, &by_slot, pairs).into());
+        self
+    }
+
     /// Calls `visit` with each bond that holds: its ends and the bond.
     fn bonds(&self, states: &BondStates, mut visit: impl FnMut(usize, usize, Bond<D, f64>)) {
         let weights = &self.operator.weights;
+        let varied = weights.heterogeneity.as_deref();
+        let factor = |here, there| varied.map_or(1.0, |varied| varied.factor(here, there));
         match &self.body.families {
             Families::Lattice(families) => {
                 let (lattice, weights) = (&families.lattice, &weights.by_offset);
@@ -114,8 +132,8 @@ impl<const D: usize> Specimen<D> {
                     for (k, offset) in families.offsets.iter().enumerate() {
                         for bit in (0..BLOCK).filter(|b| states.words()[block as usize * n + k] >> b & 1 == 1) {
                             let here = lattice.guard + block as usize * BLOCK + bit;
-                            let bond = Bond::new(offset.xi, offset.length, weights[k]);
-                            visit(here, here.wrapping_add_signed(offset.shift), bond);
+                            let there = here.wrapping_add_signed(offset.shift);
+                            visit(here, there, Bond::new(offset.xi, offset.length, weights[k] * factor(here, there)));
                         }
                     }
                 }
@@ -128,7 +146,7 @@ impl<const D: usize> Specimen<D> {
                         let there = families.neighbours[bond] as usize;
                         let xi: [f64; D] = std::array::from_fn(|d| positions[there][d] - positions[here][d]);
                         let length = xi.iter().map(|x| x * x).sum::<f64>().sqrt();
-                        let weight = weights.weight(bond, length, volumes[there]);
+                        let weight = weights.weight(bond, length, volumes[there]) * factor(here, there);
                         visit(here, there, Bond::new(xi, length, weight));
                     }
                 }
@@ -208,7 +226,14 @@ fn specimens<const D: usize>(scale: f64) -> Vec<Specimen<D>> {
         .map(|&s| regular.position(s as usize).map(|x| x + 0.2 * SPACING * random.next()))
         .collect();
     let volumes = (0..regular.n_points()).map(|_| SPACING.powi(D as i32) * (1.0 + 0.3 * random.next())).collect();
-    vec![Specimen::new(lattice(), scale, 1), Specimen::new(Cloud::scattered(positions, volumes), scale, 2)]
+    let cloud = Cloud::scattered(positions, volumes);
+    vec![
+        Specimen::new(lattice(), scale, 1),
+        Specimen::new(cloud.clone(), scale, 2),
+        Specimen::new(lattice(), scale, 1).of(|x| if x[0] < 0.2 * SPACING { 1.0 } else { 7.0 }, None),
+        Specimen::new(lattice(), scale, 1).of(|x| (300.0 * x[0]).exp(), Some(0.3)),
+        Specimen::new(cloud, scale, 2).of(|x| (300.0 * x[0]).exp(), Some(0.3)),
+    ]
 }
 
 /// Unit round-off of bonds in this precision.
@@ -344,6 +369,11 @@ fn rows_give_the_sums_of_their_bonds() {
         let shape = Shape::Box { low: [0.0; D], high: [cells * SPACING; D] };
         let mut specimen = Specimen::new(Cloud::lattice(&shape, SPACING, 5), 1e-3, 3);
         specimen.states = BondStates::whole(&specimen.body);
+        check_rows::<D, P>(&specimen);
+        let half = 0.5 * cells * SPACING;
+        check_rows::<D, P>(&specimen.of(|x| if x[0] < half { 0.4 } else { 5.0 }, None));
+    }
+    fn check_rows<const D: usize, P: Packs>(specimen: &Specimen<D>) {
         let (plain, size) = specimen.plain(BondBasedLinear, &specimen.states);
         for instructions in Instructions::available() {
             let (fast, ..) = specimen.fast::<P>(instructions, &Linear, &Unbreakable);

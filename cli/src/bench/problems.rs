@@ -32,6 +32,16 @@ pub enum Body {
     Plate,
 }
 
+/// How many materials a cube is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parts {
+    One,
+    /// Two, on either side of its middle.
+    Halves,
+    /// Two, cell by cell.
+    Grains,
+}
+
 /// A problem to be timed.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem {
@@ -45,16 +55,17 @@ pub struct Problem {
     pub solid: bool,
     /// Whether bonds break while it is timed.
     pub breaking: bool,
+    pub parts: Parts,
 }
 
 /// All of them, in the order of the table.
 #[rustfmt::skip] // a table
-pub const PROBLEMS: [Problem; 11] = {
-    use {Body::*, Path::*};
+pub const PROBLEMS: [Problem; 15] = {
+    use {Body::*, Parts::*, Path::*};
     const fn problem(
         name: &'static str, body: Body, path: Path, linear: bool, breaking: bool, about: &'static str,
     ) -> Problem {
-        Problem { name, about, body, path, linear, solid: false, breaking }
+        Problem { name, about, body, path, linear, solid: false, breaking, parts: One }
     }
     [
         problem("block3d", Cube, Lattice, false, false,
@@ -79,6 +90,14 @@ pub const PROBLEMS: [Problem; 11] = {
             "the cube as a state-based solid: both passes over the bonds") },
         Problem { solid: true, ..problem("lps3d-cloud", Cube, Cloud, false, false,
             "the scattered cloud as a state-based solid") },
+        Problem { parts: Halves, ..problem("halves3d", Cube, Lattice, false, false,
+            "block3d of two materials, one on either side") },
+        Problem { parts: Grains, ..problem("grains3d", Cube, Lattice, false, false,
+            "block3d of two materials, cell by cell: every bond has its weight looked up") },
+        Problem { parts: Halves, ..problem("halves3d-cloud", Cube, Cloud, false, false,
+            "cloud3d of two materials, one on either side") },
+        Problem { parts: Halves, solid: true, ..problem("halves3d-lps", Cube, Lattice, false, false,
+            "lps3d of two materials, one on either side") },
     ]
 };
 
@@ -143,6 +162,22 @@ impl Problem {
         };
         // That of bonds, so that the bodies of all problems are of one material.
         let poisson = if self.solid { ", poisson = 0.25" } else { "" };
+        let first = match self.parts {
+            Parts::One => "",
+            Parts::Halves => "x < 0.5*n*5e-4",
+            // An even sum of the three numbers of a cell.
+            Parts::Grains => "cos(pi*(x + y + z - 7.5e-4)/5e-4) > 0",
+        };
+        let (of, materials) = if self.parts == Parts::One {
+            (format!("law = {{ {law} = {{ young = 72e9, density = 2440{poisson} }} }}"), String::new())
+        } else {
+            let sets =
+                format!("[sets]\nfirst = {{ where = \"{first}\" }}\nsecond = {{ not = {{ where = \"{first}\" }} }}");
+            let a = format!("[materials.a]\nyoung = 72e9\ndensity = 2440{}", poisson.replace(", ", "\n"));
+            let b = format!("[materials.b]\nyoung = 36e9\ndensity = 1500{}", poisson.replace(", ", "\n"));
+            let law = format!("law = {{ {law} = {{}} }}\nmaterials = {{ a = \"first\", b = \"second\" }}");
+            (law, format!("{sets}\n{a}\n{b}"))
+        };
         format!(
             r#"
 [case]
@@ -158,8 +193,9 @@ spacing = 5e-4
 [discretization]
 horizon_ratio = 3.015
 partial_volumes = "none"
+{materials}
 [physics.elasticity]
-law = {{ {law} = {{ young = 72e9, density = 2440{poisson} }} }}
+{of}
 {failure}
 [[conditions]]
 on = "all"

@@ -47,10 +47,13 @@ pub(super) fn check<'a>(checker: &mut Checker<'_>, case: &'a Case, used: &mut BT
             );
             continue;
         }
-        for (key, given) in [("young", material.young.is_some()), ("density", material.density.is_some())] {
+        for (key, unit, given) in
+            [("young", "Pa", material.young.is_some()), ("density", "kg/m^3", material.density.is_some())]
+        {
             if !given && material.material.is_none() {
-                let help =
-                    format!("add `{key} = <number or formula>`, or take both from the library: `material = \"PMMA\"`");
+                let help = format!(
+                    "add `{key} = <number or formula, {unit}>`, or take both from the library: `material = \"PMMA\"`"
+                );
                 checker.error(&path, format!("missing key `{key}`"), &help);
             }
         }
