@@ -17,13 +17,14 @@ use bondwise::output::plot::{Plot, Series, Style, draw_plot};
 use bondwise::output::source::{Source, deformed, scalar};
 use bondwise::physics::elasticity::discrete::discrete_moduli;
 use bondwise::physics::elasticity::moduli::Hypothesis;
+use bondwise::simulation::Simulation;
 
-const CASE: &str = include_str!("fracture_work.toml");
+pub(super) const CASE: &str = include_str!("fracture_work.toml");
 /// G₀ of the case, J/m².
 const FRACTURE_ENERGY: f64 = 3.8;
 /// Where the tip is while slopes are taken, m.
 const MEASURED: std::ops::RangeInclusive<f64> = -4e-3..=8e-3;
-const LOOK_EVERY: u64 = 20;
+pub(super) const LOOK_EVERY: u64 = 20;
 
 const GRIFFITH: &str = "Griffith: a crack takes G₀ for each new area, Shojaei et al. 2022, eq. (20); 10 % for the finite \
     spacing (W/G₀ is 0.929 with whole cells and 1.021 with the ramp at m = 4)";
@@ -38,16 +39,16 @@ struct Variant {
 
 /// Energies (J/m) over the way of the tip (m).
 #[derive(Default)]
-struct Way {
-    tip: Vec<f64>,
-    external: Vec<f64>,
-    fracture: Vec<f64>,
-    damped: Vec<f64>,
+pub(super) struct Way {
+    pub tip: Vec<f64>,
+    pub external: Vec<f64>,
+    pub fracture: Vec<f64>,
+    pub damped: Vec<f64>,
     /// Kinetic and strain energy.
-    stored: Vec<f64>,
-    imbalance: f64,
-    /// Largest distance of a damaged point from the middle line, m.
-    width: f64,
+    pub stored: Vec<f64>,
+    pub imbalance: f64,
+    /// Largest distance of a damaged point from the middle line, in horizons.
+    pub width: f64,
 }
 
 pub fn run(full: bool) -> Result<Outcome> {
@@ -135,6 +136,13 @@ fn march(variant: &Variant) -> Result<(Way, Image)> {
         ("constants.within", within),
     ];
     let mut run = simulation("fracture_work.toml", CASE, &overrides)?;
+    let (way, damage) = follow(&mut run)?;
+    let picture = picture(&mut *run.model, variant, &damage, run.clock.time());
+    Ok((way, picture))
+}
+
+/// Runs a strip to its end; the way of its crack, and the damage at the end.
+pub(super) fn follow(run: &mut Simulation) -> Result<(Way, Vec<f64>)> {
     let mut tip = run.history.tip.take();
     let model = &mut *run.model;
     let mut way = Way::default();
@@ -164,8 +172,7 @@ fn march(variant: &Variant) -> Result<(Way, Image)> {
     let horizon = model.facts().horizon;
     let damaged = model.positions().iter().zip(&damage).filter(|(_, d)| **d > 0.35);
     way.width = damaged.map(|(x, _)| x[1].abs() / horizon).fold(0.0, f64::max);
-    let picture = picture(model, variant, &damage, run.clock.time());
-    Ok((way, picture))
+    Ok((way, damage))
 }
 
 fn picture(model: &mut dyn Source, variant: &Variant, damage: &[f64], time: f64) -> Image {
@@ -195,7 +202,7 @@ impl Variant {
 impl Way {
     /// Slope of the least-squares line of `energies` over the position of the tip, J/m²; NaN if the tip was never
     /// where it is measured.
-    fn slope(&self, energies: &[f64]) -> f64 {
+    pub(super) fn slope(&self, energies: &[f64]) -> f64 {
         let measured = || self.tip.iter().zip(energies).filter(|(x, _)| MEASURED.contains(*x));
         let n = measured().count() as f64;
         let mean = measured().fold((0.0, 0.0), |m, (x, e)| (m.0 + x / n, m.1 + e / n));

@@ -151,12 +151,14 @@ fn run(full: bool) -> Result<Outcome> {
                 }
             }
             let [(coarse, first), .., (fine, last)] = errors[..] else { continue };
+            // The moduli of the lattice at a finite m are cubic, and no closed form knows what that does to shear.
+            let judged = if pull == Pull::Even { Measure::AtLeast } else { Measure::Information };
             outcome.rows.push(Row::new(
                 format!("{label}: order of the error by spacing"),
-                0.7,
+                0.6,
                 (first / last).ln() / (coarse / fine).ln(),
                 0.0,
-                Measure::AtLeast,
+                judged,
                 "first order; the staircase of a surface makes it uneven",
             ));
             series.push(Series { name: label, points: errors, style: Style::LineDots });
@@ -178,9 +180,9 @@ fn run(full: bool) -> Result<Outcome> {
 /// Of the finest grid.
 fn tolerance(dimension: usize, full: bool) -> f64 {
     match (dimension, full) {
-        (2, false) => 0.03,
+        (2, false) => 0.02,
         (2, true) => 0.015,
-        (_, false) => 0.12,
-        _ => 0.06,
+        (_, false) => 0.06,
+        _ => 0.03,
     }
 }
