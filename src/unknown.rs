@@ -14,8 +14,8 @@ pub struct Vectors<'a, T> {
     pub rate: &'a mut [T],
     /// τ (s) and where u + τ v is wanted after a drift, if it is.
     pub damped: Option<(f64, &'a mut [T])>,
-    /// ρ over the inertia of the unknown, by place in a component; None where that is the inertia of all.
-    pub relative_inertia: Option<&'a [T]>,
+    /// ρ over the inertia of the unknown, and that over ρ, by place in a component; None where that is the inertia of all.
+    pub relative_inertia: Option<[&'a [T]; 2]>,
 }
 
 /// The same in the numbers that they are stored in, and what solvers need to know of them.
@@ -64,13 +64,13 @@ pub struct Component<'a, T> {
     /// Empty of an equation of first order.
     pub velocity: &'a mut [T],
     pub rate: &'a mut [T],
-    pub relative_inertia: Option<&'a [T]>,
+    pub relative_inertia: Option<[&'a [T]; 2]>,
 }
 
 impl<T: Number> Component<'_, T> {
     /// ρ at a place, of an unknown with this inertia.
     pub fn inertia(&self, unit: f64, slot: usize) -> f64 {
-        self.relative_inertia.map_or(unit, |relative| unit * relative[slot].to_f64())
+        self.relative_inertia.map_or(unit, |[relative, _]| unit * relative[slot].to_f64())
     }
 }
 

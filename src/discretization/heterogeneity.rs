@@ -8,17 +8,28 @@
 //! ```
 //!
 //! the harmonic mean, as of two springs in a row, each half of the bond; t ≠ 1 where a pair of materials has a constant of its
-//! own. On a lattice a block of points that sees one constant only keeps shared rows, one set for each constant; mixed blocks
-//! look d up point by point.
+//! own. Points that see one constant only are summed as in a body of one, blocks of a lattice by rows of their own, points of
+//! a cloud by a factor of their sum. Blocks that see two, as where two materials meet, choose among three factors by a bit of
+//! each end; all others look d up point by point.
 
 use crate::family::{Body, BondStates, Families};
 use crate::geometry::lattice::BLOCK;
 use crate::parallel;
 
-/// Constants that blocks of a lattice may share; further ones are looked up point by point.
+/// Constants that points may share; further ones are looked up point by point.
 const LEVELS: usize = 8;
 const NO_POINT: u8 = u8::MAX;
 const MANY: u8 = u8::MAX - 1;
+
+/// What the bonds of a block of a lattice, or of a point of a cloud, have to do with the levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seen {
+    /// All are of one.
+    One(usize),
+    /// Both ends are of these two.
+    Two([usize; 2]),
+    Many,
+}
 
 /// What the constants of bonds are beside that of the weights.
 #[derive(Debug, Clone)]
@@ -27,10 +38,12 @@ pub struct Heterogeneity {
     compliance: Vec<f64>,
     single: Vec<f32>,
     pairs: Option<PairTable>,
-    /// c/c₀ of blocks that see one constant only.
-    levels: Vec<f64>,
-    /// Of each block of a lattice which of them; `MANY` for mixed ones.
-    of_block: Vec<u8>,
+    /// c/c₀ of the constants that points share, and a slot of each.
+    levels: Vec<(f64, usize)>,
+    /// Which of them are seen by each block of a lattice, or by each point of a cloud: twice the same, two, or `MANY` first.
+    seen: Vec<[u8; 2]>,
+    /// Of each level and slot of a lattice, a bit: whether the slot is of the level; and a word behind.
+    bits: Vec<Vec<u16>>,
 }
 
 /// Factors of the bonds between materials whose pair has a constant of its own.
@@ -56,47 +69,69 @@ impl Heterogeneity {
     pub fn new<const D: usize>(body: &Body<D>, relative: &[f64], pairs: Option<PairTable>) -> Self {
         let compliance: Vec<f64> = relative.iter().map(|&c| if c > 0.0 { 0.5 / c } else { 0.5 }).collect();
         let single = compliance.iter().map(|&d| d as f32).collect();
-        let mut levels: Vec<(u64, u8)> = Vec::new();
-        let level = |slot: usize, levels: &mut Vec<(u64, u8)>| {
+        let mut keys: Vec<(u64, u8)> = Vec::new();
+        let mut levels = Vec::new();
+        let mut level = |slot: usize| {
             let key = (compliance[slot].to_bits(), pairs.as_ref().map_or(0, |pairs| pairs.materials[slot]));
-            match levels.iter().position(|level| *level == key) {
+            match keys.iter().position(|level| *level == key) {
                 Some(level) => level as u8,
-                None if levels.len() < LEVELS => {
-                    levels.push(key);
-                    levels.len() as u8 - 1
+                None if keys.len() < LEVELS => {
+                    keys.push(key);
+                    levels.push((relative[slot], slot));
+                    keys.len() as u8 - 1
                 }
                 None => MANY,
             }
         };
-        let of_slot: Vec<u8> = (0..relative.len())
-            .map(|slot| if relative[slot] > 0.0 { level(slot, &mut levels) } else { NO_POINT })
-            .collect();
-        let of_block = match &body.families {
-            Families::Cloud(_) => Vec::new(),
+        let of_slot: Vec<u8> =
+            (0..relative.len()).map(|slot| if relative[slot] > 0.0 { level(slot) } else { NO_POINT }).collect();
+        let see = |seen: &mut [u8; 2], slot: usize| match (of_slot[slot], *seen) {
+            (NO_POINT, _) | (_, [MANY, _]) => {}
+            (MANY, _) => seen[0] = MANY,
+            (level, [NO_POINT, _]) => *seen = [level; 2],
+            (level, [a, b]) if level == a || level == b => {}
+            (level, [a, b]) if a == b => *seen = [a.min(level), a.max(level)],
+            _ => seen[0] = MANY,
+        };
+        let seen = match &body.families {
+            Families::Cloud(families) => {
+                let of_point = |point: usize| {
+                    let mut seen = [NO_POINT; 2];
+                    see(&mut seen, point);
+                    families.neighbours[families.of(point)].iter().for_each(|&there| see(&mut seen, there as usize));
+                    seen
+                };
+                parallel::map(relative.len(), &of_point)
+            }
             Families::Lattice(families) => {
                 let lattice = &families.lattice;
                 let of_block = |block: usize| {
                     let first = lattice.guard + block * BLOCK;
-                    let mut found = NO_POINT;
+                    let mut seen = [NO_POINT; 2];
                     for slot in (first..first + BLOCK).filter(|&slot| of_slot[slot] != NO_POINT) {
+                        see(&mut seen, slot);
                         let there = families.offsets.iter().map(|offset| slot.wrapping_add_signed(offset.shift));
-                        for slot in std::iter::once(slot).chain(there) {
-                            match of_slot[slot] {
-                                NO_POINT => {}
-                                MANY => return MANY,
-                                level if found == NO_POINT => found = level,
-                                level if found != level => return MANY,
-                                _ => {}
-                            }
-                        }
+                        there.for_each(|there| see(&mut seen, there));
                     }
-                    if found == NO_POINT { 0 } else { found }
+                    if seen[0] == NO_POINT { [0; 2] } else { seen }
                 };
                 parallel::map(lattice.n_blocks(), &of_block)
             }
         };
-        let levels = levels.iter().map(|(bits, _)| 0.5 / f64::from_bits(*bits)).collect();
-        Heterogeneity { compliance, single, pairs, levels, of_block }
+        let bits = match &body.families {
+            Families::Cloud(_) => Vec::new(),
+            Families::Lattice(_) => {
+                let word = |level: usize, word: usize| {
+                    let bit = |bit: usize| u16::from(of_slot[BLOCK * word + bit] == level as u8) << bit;
+                    (0..BLOCK).map(bit).fold(0, |a, b| a | b)
+                };
+                let n = of_slot.len() / BLOCK;
+                // And a word behind, which is read beside the last.
+                let words = |level| [parallel::map(n, &|k| word(level, k)), vec![0]].concat();
+                (0..levels.len()).map(words).collect()
+            }
+        };
+        Heterogeneity { compliance, single, pairs, levels, seen, bits }
     }
 
     /// c(x, x′)/c₀ of the bond between two slots; the same from both ends.
@@ -120,16 +155,34 @@ impl Heterogeneity {
         self.pairs.as_ref()
     }
 
-    /// c/c₀ of blocks that see one constant only.
-    pub fn levels(&self) -> &[f64] {
-        &self.levels
+    /// c/c₀ of the constants that points share.
+    pub fn levels(&self) -> impl Iterator<Item = f64> + Clone + '_ {
+        self.levels.iter().map(|(factor, _)| *factor)
     }
 
-    /// Which of the levels all bonds of the points of a block have; None where they differ.
+    pub fn n_levels(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// c/c₀ of the bonds between points of two levels.
+    pub fn between(&self, levels: [usize; 2]) -> f64 {
+        let [here, there] = levels.map(|level| self.levels[level].1);
+        self.factor(here, there)
+    }
+
+    /// What the bonds of a block of a lattice, or of a point of a cloud, see.
     #[inline]
-    pub fn level(&self, block: u32) -> Option<usize> {
-        let level = self.of_block[block as usize];
-        (level != MANY).then_some(level as usize)
+    pub fn seen(&self, of: usize) -> Seen {
+        match self.seen[of] {
+            [MANY, _] => Seen::Many,
+            [a, b] if a == b => Seen::One(a as usize),
+            [a, b] => Seen::Two([a as usize, b as usize]),
+        }
+    }
+
+    /// Of each slot of a lattice, whether it is of this level: sixteen bits a word.
+    pub fn bits(&self, level: usize) -> &[u16] {
+        &self.bits[level]
     }
 
     /// Slots of the points that have a bond in `states` to another constant.
@@ -159,7 +212,8 @@ impl Heterogeneity {
     /// Bytes.
     pub fn memory(&self) -> usize {
         let pairs = self.pairs.as_ref().map_or(0, |pairs| pairs.materials.len());
-        size_of_val(&self.compliance[..]) + size_of_val(&self.single[..]) + self.of_block.len() + pairs
+        let bits: usize = self.bits.iter().map(|bits| size_of_val(&bits[..])).sum();
+        size_of_val(&self.compliance[..]) + size_of_val(&self.single[..]) + size_of_val(&self.seen[..]) + bits + pairs
     }
 }
 
@@ -177,11 +231,12 @@ mod tests {
             relative[slot as usize] = if body.cloud.position(slot as usize)[0] < 4.8 { 1.0 } else { 3.0 };
         }
         let found = Heterogeneity::new(&body, &relative, None);
-        assert_eq!(found.levels(), [1.0, 3.0]);
+        assert!(found.levels().eq([1.0, 3.0]));
         let Families::Lattice(families) = &body.families else { panic!("a lattice") };
-        let blocks: Vec<_> = families.blocks[..6].iter().map(|&block| found.level(block)).collect();
+        let blocks: Vec<_> = families.blocks[..6].iter().map(|&block| found.seen(block as usize)).collect();
         // The joint lies between the third block of a row and the fourth; both see across.
-        assert_eq!(blocks, [Some(0), Some(0), None, None, Some(1), Some(1)]);
+        let (one, two) = (Seen::One, Seen::Two([0, 1]));
+        assert_eq!(blocks, [one(0), one(0), two, two, one(1), one(1)]);
         // Three columns of points on either side.
         assert_eq!(found.mixed(&body, &BondStates::whole(&body)).len(), 6 * 8);
         let [a, b] = [families.blocks[0], families.blocks[5]].map(|block| families.lattice.guard + 16 * block as usize);
@@ -204,6 +259,6 @@ mod tests {
         body.cloud.slots.iter().for_each(|&slot| relative[slot as usize] = 1.0 + f64::from(slot));
         let found = Heterogeneity::new(&body, &relative, None);
         let Families::Lattice(families) = &body.families else { panic!("a lattice") };
-        assert!(families.blocks.iter().all(|&block| found.level(block).is_none()));
+        assert!(families.blocks[1..].iter().all(|&block| found.seen(block as usize) == Seen::Many));
     }
 }

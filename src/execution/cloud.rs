@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::packs::{BondVectors, Instructions, LoadEnds, Pack, Packs, SiteView};
 use super::{BreakRule, Broken, Memory, SharedSlice, StatesPointer};
 use crate::discretization::Heterogeneity;
+use crate::discretization::heterogeneity::Seen;
 use crate::discretization::standard::{CloudWeights, WeightPolynomial};
 use crate::family::{Bond, BondKernel, CloudFamilies, GROUP};
 use crate::field::Number;
@@ -70,41 +71,54 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             // SAFETY: `Exec::pass` has checked the lengths of all fields; neighbours are points of the cloud; the words
             // of a point and its slot belong to the chunk that owns the point.
             unsafe {
-                let mut largest = self.small(point);
+                let scale = self.scale(point);
+                let mut largest = self.small(point, scale);
                 if !R::NEVER && largest > threshold {
                     let here = self.break_bonds(point, rule);
                     if here.bonds > 0 {
                         broken.bonds += here.bonds;
                         broken.energy += here.energy;
-                        largest = self.small(point);
+                        largest = self.small(point, scale);
                     }
                 }
                 if K::TWO_FORMS && largest > K::SMALL {
-                    self.sum::<false, false>(point);
+                    self.sum::<false, false>(point, scale);
                 }
             }
         }
         broken
     }
 
+    /// What the sum of a point is multiplied by; None where its bonds are not all of one constant.
+    #[inline(always)]
+    fn scale(&self, point: usize) -> Option<f64> {
+        match self.heterogeneity {
+            None => Some(1.0),
+            Some(varied) => matches!(varied.seen(point), Seen::One(_)).then(|| varied.relative(point)),
+        }
+    }
+
     /// # Safety
     /// As of [`Sum::sum`].
-    unsafe fn small(&self, point: usize) -> f64 {
+    unsafe fn small(&self, point: usize, scale: Option<f64>) -> f64 {
         unsafe {
-            if K::EVERY_STEP && self.profile.plain && self.heterogeneity.is_none() {
-                self.sum::<true, true>(point)
+            if K::EVERY_STEP && self.profile.plain && scale.is_some() {
+                self.sum::<true, true>(point, scale)
             } else {
-                self.sum::<true, false>(point)
+                self.sum::<true, false>(point, scale)
             }
         }
     }
 
-    compiled!(sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP, [with SMALL: bool, PLAIN: bool], (point: usize), f64);
+    compiled!(
+        sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP,
+        [with SMALL: bool, PLAIN: bool], (point: usize, scale: Option<f64>), f64
+    );
     compiled!(break_bonds, break_on, break_avx2, break_avx512 if false, [rule R: BreakRule<D>], (point: usize, rule: &R), Broken);
 
     /// Sums one family into the output, in the small or the exact form, with `PLAIN` weights or any; returns the largest |strain| of its whole bonds.
     #[inline(always)]
-    unsafe fn sum_on<V, const SMALL: bool, const PLAIN: bool>(&self, point: usize) -> f64
+    unsafe fn sum_on<V, const SMALL: bool, const PLAIN: bool>(&self, point: usize, scale: Option<f64>) -> f64
     where
         V: Pack<P::Bond> + LoadEnds<P::Field> + BondVectors<P::Site>,
     {
@@ -118,7 +132,8 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             }
             for part in 0..GROUP / V::LANES {
                 let mask = word >> (part * V::LANES);
-                let (mut bond, relative, added) = unsafe { self.bond::<V, PLAIN>(point, group, part, &here, mask) };
+                let (mut bond, relative, added) =
+                    unsafe { self.bond::<V, PLAIN>(point, group, part, &here, mask, scale.is_none()) };
                 let strain = self.kernel.strain(&bond, &relative);
                 watch = watch.larger(strain);
                 if K::MEMORY {
@@ -156,7 +171,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                     sums[part][c] = sums[part][c] + sums[part + parts][c];
                 }
             }
-            let total = sums[0][c].total().to_f64();
+            let total = sums[0][c].total().to_f64() * scale.unwrap_or(1.0);
             // SAFETY: `point` belongs to this chunk alone and the field has the length of the cloud.
             unsafe { *self.output[c].0.add(point) = P::Field::from_f64(total) };
         }
@@ -176,7 +191,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             let word = unsafe { &mut *self.words().add(group) };
             for part in 0..GROUP / V::LANES {
                 let (bond, relative, _) =
-                    unsafe { self.bond::<V, false>(point, group, part, &here, *word >> (part * V::LANES)) };
+                    unsafe { self.bond::<V, false>(point, group, part, &here, *word >> (part * V::LANES), true) };
                 let strain = self.kernel.strain(&bond, &relative);
                 if strain.largest() <= threshold {
                     continue;
@@ -215,26 +230,41 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
 
     /// The weights of consecutive bonds of a point, from their lengths and the volumes at their other ends.
     #[inline(always)]
-    fn weigh<V: Pack<P::Bond>, const PLAIN: bool>(&self, point: usize, first: usize, length: V, volume: V) -> V {
+    fn weigh<V: Pack<P::Bond>, const PLAIN: bool>(
+        &self,
+        point: usize,
+        first: usize,
+        length: V,
+        volume: V,
+        varied: bool,
+    ) -> V {
         if PLAIN {
             return volume * V::splat(self.profile.influence[0]);
         }
         let weight = self.weigh_alike(first, length, volume);
-        match self.heterogeneity {
+        match self.heterogeneity.filter(|_| varied) {
             None => weight,
             Some(varied) => weight * self.factors(varied, point, first),
         }
     }
 
     /// What the weights of consecutive bonds of a point are multiplied by where materials differ.
-    #[inline(never)]
+    #[inline(always)]
     fn factors<V: Pack<P::Bond>>(&self, varied: &Heterogeneity, point: usize, first: usize) -> V {
-        let mut factors = [P::Bond::default(); GROUP];
-        for (factor, &there) in factors[..V::LANES].iter_mut().zip(&self.families.neighbours[first..]) {
-            *factor = P::Bond::from_f64(varied.factor(point, there as usize));
+        let (double, single) = varied.compliance();
+        let (compliance, neighbours) = (P::Bond::choose(double, single), &self.families.neighbours[first..]);
+        let mut there = [P::Bond::default(); GROUP];
+        for (there, &slot) in there[..V::LANES].iter_mut().zip(neighbours) {
+            *there = compliance[slot as usize];
         }
         // SAFETY: a pack has at most `GROUP` lanes.
-        unsafe { V::load(factors.as_ptr()) }
+        let factor = V::splat(1.0) / (V::broadcast(compliance[point]) + unsafe { V::load(there.as_ptr()) });
+        let Some(pairs) = varied.pairs() else { return factor };
+        for (there, &slot) in there[..V::LANES].iter_mut().zip(neighbours) {
+            *there = P::Bond::from_f64(pairs.of(point, slot as usize));
+        }
+        // SAFETY: as above.
+        factor * unsafe { V::load(there.as_ptr()) }
     }
 
     /// The weights of bonds of one material.
@@ -300,7 +330,8 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         here
     }
 
-    /// One part of a group of bonds, and the relative values of their ends.
+    /// One part of a group of bonds, and the relative values of their ends. `varied`: with the constant of each, where these
+    /// differ.
     #[inline(always)]
     unsafe fn bond<V, const PLAIN: bool>(
         &self,
@@ -309,6 +340,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         part: usize,
         here: &Here<V::Held, I, A>,
         mask: u16,
+        varied: bool,
     ) -> (Bond<D, V>, [V; I], [V; A])
     where
         V: Pack<P::Bond> + LoadEnds<P::Field> + BondVectors<P::Site>,
@@ -331,7 +363,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         }
         let inverse = square.inverse_root();
         let length = square * inverse;
-        let weight = self.weigh::<V, PLAIN>(point, first, length, volume);
+        let weight = self.weigh::<V, PLAIN>(point, first, length, volume, varied);
         let (spring, moment, memory) = (weight * inverse, weight * length, V::splat(0.0));
         const { assert!(I <= 4 && I + A <= 8, "values of a point stand in two records, differences in the first") };
         let bond = Bond { xi, length, inverse_square: inverse * inverse, weight, spring, moment, memory };

@@ -8,6 +8,7 @@
 
 use super::packs::{Instructions, LoadEnds, Pack, Packs};
 use super::{BreakRule, Broken, Memory, SharedSlice, StatesPointer};
+use crate::discretization::heterogeneity::Seen;
 use crate::discretization::{BondWeights, Heterogeneity};
 use crate::family::{Bond, BondKernel, LatticeFamilies, Offset};
 use crate::field::{Number, Precision};
@@ -18,8 +19,15 @@ use crate::lane::Lane;
 /// Blocks in a chunk: the unit that threads share out, and of the ordered sums. Fixed, whatever the threads.
 const CHUNK: usize = 64;
 
-/// In the place of the first row of a block: each bond has its own weight.
-const MIXED: usize = usize::MAX;
+/// Which weights the bonds of a block have: those of rows, from this one on, or in multiples of the first rows.
+#[derive(Debug, Clone, Copy)]
+pub enum Weights {
+    Rows(usize),
+    /// By the levels of both ends.
+    Two([usize; 2]),
+    /// By the compliance of both.
+    Many,
+}
 
 /// What the loop reads of a body.
 pub struct View<'a, const D: usize, B> {
@@ -65,8 +73,8 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
             }
         };
         // Mixed blocks begin with the first row, and need one of the weights themselves.
-        let levels = heterogeneity.map_or(&[][..], Heterogeneity::levels);
-        let factors = std::iter::once(&1.0).chain(levels);
+        let levels = heterogeneity.into_iter().flat_map(Heterogeneity::levels);
+        let factors = std::iter::once(1.0).chain(levels);
         let all = factors.flat_map(|factor| families.offsets.iter().zip(weights.iter().map(move |w| w * factor)));
         let compliance = heterogeneity.map_or(&[][..], |varied| {
             let (double, single) = varied.compliance();
@@ -83,10 +91,16 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
         }
     }
 
-    /// The first row of the bonds of a block: None where they differ from point to point.
+    /// Which weights the bonds of a block have.
     #[inline(always)]
-    pub fn level(&self, block: u32) -> Option<usize> {
-        self.heterogeneity.map_or(Some(0), |varied| varied.level(block).map(|level| level + 1))
+    pub fn weights_of(&self, block: u32) -> Weights {
+        let Some(varied) = self.heterogeneity else { return Weights::Rows(0) };
+        match varied.seen(block as usize) {
+            // The first rows are those of the weights themselves.
+            Seen::One(level) => Weights::Rows((level + 1) * self.families.offsets.len()),
+            Seen::Two(levels) => Weights::Two(levels),
+            Seen::Many => Weights::Many,
+        }
     }
 
     pub fn n_chunks(&self) -> usize {
@@ -101,6 +115,20 @@ impl<'a, const D: usize, B: Number> View<'a, D, B> {
     /// The first slot of a block.
     pub fn slot(&self, block: u32) -> usize {
         self.lattice.guard + block as usize * BLOCK
+    }
+}
+
+/// Of a block whose bonds differ: which of its slots are of the second of two levels, and the factors of the bonds within
+/// the first, between, and within the second. Nothing if there are more levels.
+struct Choice<'a, V> {
+    bits: Option<&'a [u16]>,
+    factors: [V; 3],
+}
+
+impl<V: Lane> Default for Choice<'_, V> {
+    #[inline(always)]
+    fn default() -> Self {
+        Choice { bits: None, factors: [V::splat(0.0); 3] }
     }
 }
 
@@ -131,43 +159,42 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             // `Exec::pass` has checked; the words of a block and its slots belong to this chunk alone.
             unsafe {
                 let words = std::slice::from_raw_parts_mut(words.add(block as usize * n), n);
-                let level = self.view.level(block);
-                let mut largest = self.bonds::<true>(words, slot, level);
+                let weights = self.view.weights_of(block);
+                let mut largest = self.bonds::<true>(words, slot, weights);
                 if !R::NEVER && largest > threshold {
                     let here = self.break_bonds(words, slot, rule);
                     if here.bonds > 0 {
                         broken.bonds += here.bonds;
                         broken.energy += here.energy;
-                        largest = self.bonds::<true>(words, slot, level);
+                        largest = self.bonds::<true>(words, slot, weights);
                     }
                 }
                 if K::TWO_FORMS && largest > K::SMALL {
-                    self.bonds::<false>(words, slot, level);
+                    self.bonds::<false>(words, slot, weights);
                 }
             }
         }
         broken
     }
 
-    /// Sums one block whose bonds have the weights of a level, or each its own. What is summed in every step is compiled for
+    /// Sums one block whose bonds have the weights of rows, or each its own. What is summed in every step is compiled for
     /// both apart.
     ///
     /// # Safety
-    /// As of `sum_on`; `level` is what [`View::level`] says of the block.
-    pub unsafe fn bonds<const SMALL: bool>(&self, words: &[u16], slot: usize, level: Option<usize>) -> f64 {
-        let rows = level.map_or(MIXED, |level| level * self.view.families.offsets.len());
+    /// As of `sum_on`; `weights` is what [`View::weights_of`] says of the block.
+    pub unsafe fn bonds<const SMALL: bool>(&self, words: &[u16], slot: usize, weights: Weights) -> f64 {
         unsafe {
-            if !K::EVERY_STEP || (K::VARIED && rows == MIXED) {
-                self.sum::<SMALL, true>(words, slot, rows)
+            if !K::EVERY_STEP || (K::VARIED && !matches!(weights, Weights::Rows(_))) {
+                self.sum::<SMALL, true>(words, slot, weights)
             } else {
-                self.sum::<SMALL, false>(words, slot, rows)
+                self.sum::<SMALL, false>(words, slot, weights)
             }
         }
     }
 
     compiled!(
-        sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP && !VARIED,
-        [with SMALL: bool, VARIED: bool], (words: &[u16], slot: usize, rows: usize), f64
+        sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP,
+        [with SMALL: bool, VARIED: bool], (words: &[u16], slot: usize, weights: Weights), f64
     );
     compiled!(
         break_bonds, break_on, break_avx2, break_avx512 if false,
@@ -175,7 +202,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     );
 
     /// Sums one block into the output, in the small or the exact form; returns the largest |strain| of its whole bonds.
-    /// `rows`: the first of the rows of its bonds; if these may be `VARIED`, [`MIXED`] says that they are.
+    /// Unless they may be `VARIED`, the weights are those of rows.
     ///
     /// Mirror images of an offset stand in sequences of their own, which are added as a balanced tree: a mirrored body
     /// has mirrored bits.
@@ -184,11 +211,12 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         &self,
         words: &[u16],
         slot: usize,
-        rows: usize,
+        weights: Weights,
     ) -> f64 {
         let mut watch = V::splat(0.0);
-        let mixed = VARIED && rows == MIXED;
-        let rows = if mixed { 0 } else { rows };
+        let rows = if let Weights::Rows(first) = weights { first } else { 0 };
+        let mixed = VARIED && !matches!(weights, Weights::Rows(_));
+        let choice = if mixed { self.choice::<V>(weights) } else { Choice::default() };
         for part in 0..BLOCK / V::LANES {
             let first = slot + part * V::LANES;
             // SAFETY: the slots of a block are inside the input.
@@ -203,10 +231,8 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                     for _ in 0..class.members {
                         // SAFETY: classes are ranges of offsets, and words and rows have one entry an offset.
                         unsafe {
-                            let mut bond = self.bond::<V>(rows + k);
-                            if mixed {
-                                bond = self.varied(bond, k, first);
-                            }
+                            let mut bond =
+                                if mixed { self.varied::<V>(&choice, k, first) } else { self.bond::<V>(rows + k) };
                             let mask = *words.get_unchecked(k) >> (part * V::LANES);
                             let relative = self.relative::<V, I>(&self.input, k, first, &here, mask);
                             let added = self.relative::<V, A>(&self.added, k, first, &own, mask);
@@ -350,26 +376,44 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         unsafe { self.memory.numbers.0.add(bit) }
     }
 
-    /// A bond of which each lane has a constant of its own.
+    /// What [`varied`](Self::varied) needs of a block.
     #[inline(always)]
-    unsafe fn varied<V: Pack<P::Bond>>(&self, bond: Bond<D, V>, k: usize, first: usize) -> Bond<D, V> {
+    fn choice<V: Pack<P::Bond>>(&self, weights: Weights) -> Choice<'_, V> {
+        let (Some(varied), Weights::Two([a, b])) = (self.view.heterogeneity, weights) else { return Choice::default() };
+        let factor = |levels| V::splat(varied.between(levels));
+        Choice { bits: Some(varied.bits(b)), factors: [factor([a, a]), factor([a, b]), factor([b, b])] }
+    }
+
+    /// The bonds along offset `k` of consecutive slots, each with its own constant.
+    #[inline(always)]
+    unsafe fn varied<V: Pack<P::Bond>>(&self, choice: &Choice<'_, V>, k: usize, first: usize) -> Bond<D, V> {
+        let shift = unsafe { self.view.rows.get_unchecked(k).shift };
+        if let Some(bits) = choice.bits {
+            let window = |slot: usize| {
+                // SAFETY: the slots that an offset reaches lie between the guards, and so does the word behind.
+                let [low, high] = unsafe { [*bits.get_unchecked(slot / BLOCK), *bits.get_unchecked(slot / BLOCK + 1)] };
+                ((u32::from(low) | u32::from(high) << BLOCK) >> (slot % BLOCK)) as u16
+            };
+            let (here, there) = (window(first), window(first.wrapping_add_signed(shift)));
+            // Beside a joint most offsets lead to one side only. To ask for that costs more than it saves: nobody can predict
+            // the answer.
+            let [aa, ab, bb] = choice.factors;
+            return scaled(unsafe { self.bond(k) }, aa.with(ab, here ^ there).with(bb, here & there));
+        }
         // SAFETY: there is a number for each slot, and those that an offset reaches are slots.
         let mut factor = unsafe {
             let here = self.view.compliance.as_ptr().add(first);
-            let there = here.offset(self.view.rows.get_unchecked(k).shift);
-            V::splat(1.0) / (V::load(here) + V::load(there))
+            V::splat(1.0) / (V::load(here) + V::load(here.offset(shift)))
         };
         if let Some(pairs) = self.view.heterogeneity.and_then(Heterogeneity::pairs) {
             let mut factors = [P::Bond::default(); BLOCK];
             for (lane, factor) in factors[..V::LANES].iter_mut().enumerate() {
-                let there = (first + lane).wrapping_add_signed(self.view.families.offsets[k].shift);
-                *factor = P::Bond::from_f64(pairs.of(first + lane, there));
+                *factor = P::Bond::from_f64(pairs.of(first + lane, (first + lane).wrapping_add_signed(shift)));
             }
             // SAFETY: a pack has at most as many lanes as a block has slots.
             factor = factor * unsafe { V::load(factors.as_ptr()) };
         }
-        let [weight, spring, moment] = [bond.weight * factor, bond.spring * factor, bond.moment * factor];
-        Bond { weight, spring, moment, ..bond }
+        scaled(unsafe { self.bond(k) }, factor)
     }
 
     #[inline(always)]
@@ -389,6 +433,13 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             memory: V::splat(0.0),
         }
     }
+}
+
+/// Bonds with weights that are multiplied.
+#[inline(always)]
+fn scaled<const D: usize, V: Lane>(bond: Bond<D, V>, factor: V) -> Bond<D, V> {
+    let [weight, spring, moment] = [bond.weight * factor, bond.spring * factor, bond.moment * factor];
+    Bond { weight, spring, moment, ..bond }
 }
 
 // A plain loop: the closures of `array::map` and `from_fn` are functions of their own, which the compiler does not

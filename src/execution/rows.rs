@@ -3,7 +3,7 @@
 //! The bonds along ξ and −ξ carry the same matrix C, so that their two summands are C (u(x + ξ) + u(x − ξ) − 2 u(x)):
 //! half the products, no masks, nothing to watch. Blocks that lack a bond are summed bond by bond.
 
-use super::lattice;
+use super::lattice::{self, Weights};
 use super::packs::{Instructions, LoadEnds, Pack, Packs};
 use crate::discretization::Heterogeneity;
 use crate::family::{Bond, BondKernel};
@@ -52,10 +52,11 @@ impl<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Pack
             let half = class.members << (class.axes - 1);
             class.first as usize..(class.first + half) as usize
         });
-        let levels = view.heterogeneity.map_or(&[][..], Heterogeneity::levels);
-        let factors = std::iter::once(1.0).chain(levels.iter().copied());
+        let levels = view.heterogeneity.into_iter().flat_map(Heterogeneity::levels);
+        let factors = std::iter::once(1.0).chain(levels);
+        let n_levels = 1 + view.heterogeneity.map_or(0, Heterogeneity::n_levels);
         let pairs: Vec<_> = factors.flat_map(|factor| halves.clone().map(move |k| (factor, k))).map(pair).collect();
-        Sum { bonds, n: pairs.len() / (1 + levels.len()), pairs, instructions: bonds.instructions }
+        Sum { bonds, n: pairs.len() / n_levels, pairs, instructions: bonds.instructions }
     }
 
     /// Sums the blocks of one chunk.
@@ -67,12 +68,12 @@ impl<'a, const D: usize, const I: usize, const A: usize, const O: usize, P: Pack
             // SAFETY: as in `lattice::Sum::run`.
             unsafe {
                 let words = std::slice::from_raw_parts(self.bonds.states.0.add(block as usize * n), n);
-                match view.level(block) {
-                    Some(level) if words.iter().fold(u16::MAX, |all, word| all & word) == u16::MAX => {
-                        self.sum(slot, level);
+                match view.weights_of(block) {
+                    Weights::Rows(first) if words.iter().fold(u16::MAX, |all, word| all & word) == u16::MAX => {
+                        self.sum(slot, first / n);
                     }
-                    level => {
-                        self.bonds.bonds::<true>(words, slot, level);
+                    weights => {
+                        self.bonds.bonds::<true>(words, slot, weights);
                     }
                 }
             }

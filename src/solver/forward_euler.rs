@@ -20,7 +20,7 @@ impl ForwardEuler {
         let (t, dt) = (clock.time(), clock.dt);
         let mut unknown = system.unknown();
         let by = dt / unknown.inertia;
-        with!(unknown, vectors => go(vectors.value, vectors.rate, by, vectors.relative_inertia));
+        with!(unknown, vectors => go(vectors.value, vectors.rate, by, vectors.relative_inertia.map(|[_, inverse]| inverse)));
         clock.step += 1;
         system.constrain(Stage::Drift, t, dt);
         system.evolve(clock.time(), dt);
@@ -28,18 +28,18 @@ impl ForwardEuler {
 }
 
 /// u + Δt Ċ
-fn go<T: Number>(value: &mut [T], rate: &[T], by: f64, relative: Option<&[T]>) {
+fn go<T: Number>(value: &mut [T], rate: &[T], by: f64, inverse: Option<&[T]>) {
     let by = T::from_f64(by);
     let chunks = value.par_chunks_mut(CHUNK).zip(rate.par_chunks(CHUNK)).enumerate();
-    chunks.for_each(|(chunk, (u, rate))| match relative {
+    chunks.for_each(|(chunk, (u, rate))| match inverse {
         None => {
             for (u, rate) in u.iter_mut().zip(rate) {
                 *u = *u + by * *rate;
             }
         }
-        Some(relative) => {
+        Some(inverse) => {
             for (k, (u, rate)) in u.iter_mut().zip(rate).enumerate() {
-                *u = *u + by * (*rate / relative[(chunk * CHUNK + k) % relative.len()]);
+                *u = *u + by * (*rate * inverse[(chunk * CHUNK + k) % inverse.len()]);
             }
         }
     });

@@ -156,21 +156,21 @@ fn each<T: Number>(
     let moving = vectors.value.par_chunks_mut(CHUNK).zip(vectors.velocity.par_chunks_mut(CHUNK));
     let fixed = vectors.rate.par_chunks(CHUNK).zip(u0.par_chunks(CHUNK)).zip(v0.par_chunks(CHUNK));
     let sums = du.par_chunks_mut(CHUNK).zip(dv.par_chunks_mut(CHUNK));
-    let relative = vectors.relative_inertia;
+    let inverse = vectors.relative_inertia.map(|[_, inverse]| inverse);
     moving.zip(fixed).zip(sums).enumerate().for_each(|(chunk, (((u, v), ((f, u0), v0)), (du, dv)))| {
         let moving = u.iter_mut().zip(v);
         let fixed = f.iter().zip(u0).zip(v0);
         let all = moving.zip(fixed).zip(du.iter_mut().zip(dv));
-        match relative {
+        match inverse {
             None => {
                 for (((u, v), ((f, u0), v0)), (du, dv)) in all {
                     update([u, v], *f, [*u0, *v0], [du, dv]);
                 }
             }
-            Some(relative) => {
+            Some(inverse) => {
                 for (k, (((u, v), ((f, u0), v0)), (du, dv))) in all.enumerate() {
-                    let relative = relative[(chunk * CHUNK + k) % relative.len()];
-                    update([u, v], *f / relative, [*u0, *v0], [du, dv]);
+                    let inverse = inverse[(chunk * CHUNK + k) % inverse.len()];
+                    update([u, v], *f * inverse, [*u0, *v0], [du, dv]);
                 }
             }
         }

@@ -119,7 +119,7 @@ impl Drift {
         velocity: &mut [T],
         rate: &[T],
         damped: &mut [T],
-        relative: &[T],
+        [relative, inverse]: [&[T]; 2],
     ) -> f64 {
         let [keep, dt, tau, still] = [self.keep, self.dt, self.tau, self.still].map(T::from_f64);
         let (n, has_damped) = (relative.len(), !damped.is_empty());
@@ -131,14 +131,20 @@ impl Drift {
             let chunks: Vec<_> = value[part.clone()]
                 .chunks_mut(CHUNK)
                 .zip(velocity[part.clone()].chunks_mut(CHUNK))
-                .zip(rate[part].chunks(CHUNK).zip(relative.chunks(CHUNK)))
-                .map(|((displacement, velocity), (force, relative))| {
+                .zip(rate[part].chunks(CHUNK).zip(relative.chunks(CHUNK).zip(inverse.chunks(CHUNK))))
+                .map(|((displacement, velocity), (force, (relative, inverse)))| {
                     let (kick, damped) = (Kick::new(self), damped.next().unwrap_or_default());
                     let pass = Pass { kick, keep, dt, tau, still, displacement, velocity, force, damped };
-                    VariedPass { pass, relative, pending: self.pending }
+                    (pass, [relative, inverse])
                 })
                 .collect();
-            let sums: Vec<f64> = chunks.into_par_iter().map(wide).collect();
+            let sums: Vec<f64> = if self.pending {
+                let sum = |(pass, relative)| wide(VariedPass::<_, true> { pass, relative });
+                chunks.into_par_iter().map(sum).collect()
+            } else {
+                let sum = |(pass, relative)| wide(VariedPass::<_, false> { pass, relative });
+                chunks.into_par_iter().map(sum).collect()
+            };
             squares += sums.iter().sum::<f64>();
         }
         squares
@@ -181,19 +187,20 @@ impl<T: Number> Kick<T> {
 
     /// The same of a place that is `relative` times as inert, as is the square that counts.
     #[inline(always)]
-    fn kicked_varied(&self, v: T, f: T, relative: T, square: &mut f64) -> T {
-        let v = unless_below(self.slow, (v + self.factor * (f / relative)) * self.after);
+    fn kicked_varied(&self, v: T, f: T, [relative, inverse]: [T; 2], square: &mut f64) -> T {
+        let v = unless_below(self.slow, (v + self.factor * (f * inverse)) * self.after);
         *square += v.to_f64() * v.to_f64() * relative.to_f64();
         v
     }
 }
 
 /// The last half kick where inertia differs from place to place: Σ v² ρ/ρ₀.
-fn finish_varied<T: Number>(kick: Kick<T>, velocity: &mut [T], rate: &[T], relative: &[T]) -> f64 {
+fn finish_varied<T: Number>(kick: Kick<T>, velocity: &mut [T], rate: &[T], [relative, inverse]: [&[T]; 2]) -> f64 {
     let components = velocity.par_chunks_mut(relative.len()).zip(rate.par_chunks(relative.len()));
     let squares = components.flat_map(|(velocity, rate)| {
-        let chunks = velocity.par_chunks_mut(CHUNK).zip(rate.par_chunks(CHUNK)).zip(relative.par_chunks(CHUNK));
-        chunks.map(|((velocity, rate), relative)| wide(VariedChunk { kick, velocity, rate, relative }))
+        let relative = relative.par_chunks(CHUNK).zip(inverse.par_chunks(CHUNK));
+        let chunks = velocity.par_chunks_mut(CHUNK).zip(rate.par_chunks(CHUNK)).zip(relative);
+        chunks.map(|((velocity, rate), (m, i))| wide(VariedChunk { kick, velocity, rate, relative: [m, i] }))
     });
     squares.collect::<Vec<f64>>().iter().sum()
 }
@@ -202,7 +209,7 @@ struct VariedChunk<'a, T> {
     kick: Kick<T>,
     velocity: &'a mut [T],
     rate: &'a [T],
-    relative: &'a [T],
+    relative: [&'a [T]; 2],
 }
 
 impl<T: Number> Sweep for VariedChunk<'_, T> {
@@ -211,43 +218,67 @@ impl<T: Number> Sweep for VariedChunk<'_, T> {
     #[inline(always)]
     fn run(self) -> f64 {
         let mut squares = [0.0; LANES];
-        let n = self.velocity.len();
-        let (rate, relative) = (&self.rate[..n], &self.relative[..n]);
-        for k in 0..n {
-            let square = &mut squares[k % LANES];
-            self.velocity[k] = self.kick.kicked_varied(self.velocity[k], rate[k], relative[k], square);
+        let (vs, v) = self.velocity.as_chunks_mut::<LANES>();
+        let [relative, inverse] = self.relative;
+        let ((fs, f), (ms, m)) = (self.rate.as_chunks::<LANES>(), relative.as_chunks::<LANES>());
+        let (is, i) = inverse.as_chunks::<LANES>();
+        for ((v, f), (m, i)) in vs.iter_mut().zip(fs).zip(ms.iter().zip(is)) {
+            for k in 0..LANES {
+                v[k] = self.kick.kicked_varied(v[k], f[k], [m[k], i[k]], &mut squares[k]);
+            }
+        }
+        for k in 0..v.len() {
+            v[k] = self.kick.kicked_varied(v[k], f[k], [m[k], i[k]], &mut squares[k]);
         }
         squares.iter().sum()
     }
 }
 
 /// [`Pass`] where inertia differs from place to place.
-struct VariedPass<'a, T> {
+struct VariedPass<'a, T, const PENDING: bool> {
     pass: Pass<'a, T>,
-    relative: &'a [T],
-    pending: bool,
+    /// ρ/ρ₀ and its inverse.
+    relative: [&'a [T]; 2],
 }
 
-impl<T: Number> Sweep for VariedPass<'_, T> {
+impl<T: Number, const PENDING: bool> VariedPass<'_, T, PENDING> {
+    /// At most [`LANES`] numbers.
+    #[inline(always)]
+    fn some(
+        kick: &Kick<T>,
+        [keep, dt, still]: [T; 3],
+        [u, v]: [&mut [T]; 2],
+        [f, relative, inverse]: [&[T]; 3],
+        squares: &mut [f64; LANES],
+    ) {
+        for k in 0..u.len() {
+            if PENDING {
+                v[k] = kick.kicked_varied(v[k], f[k], [relative[k], inverse[k]], &mut squares[k]);
+            }
+            v[k] = unless_below(kick.slow, keep * v[k] + kick.factor * (f[k] * inverse[k]));
+            u[k] = unless_below(still, u[k] + dt * v[k]);
+        }
+    }
+}
+
+impl<T: Number, const PENDING: bool> Sweep for VariedPass<'_, T, PENDING> {
     type Output = f64;
 
     #[inline(always)]
     fn run(self) -> f64 {
         let Pass { kick, keep, dt, tau, still, displacement, velocity, force, damped } = self.pass;
+        let [relative, inverse] = self.relative;
         let mut squares = [0.0; LANES];
-        let n = displacement.len();
-        let (velocity, force, relative) = (&mut velocity[..n], &force[..n], &self.relative[..n]);
-        for k in 0..n {
-            let mut v = velocity[k];
-            if self.pending {
-                v = kick.kicked_varied(v, force[k], relative[k], &mut squares[k % LANES]);
-            }
-            v = unless_below(kick.slow, keep * v + kick.factor * (force[k] / relative[k]));
-            velocity[k] = v;
-            displacement[k] = unless_below(still, displacement[k] + dt * v);
-            if let Some(damped) = damped.get_mut(k) {
-                *damped = displacement[k] + tau * v;
-            }
+        let by = [keep, dt, still];
+        let ((us, u), (vs, v)) = (displacement.as_chunks_mut::<LANES>(), velocity.as_chunks_mut::<LANES>());
+        let ((fs, f), (ms, m)) = (force.as_chunks::<LANES>(), relative.as_chunks::<LANES>());
+        let (is, i) = inverse.as_chunks::<LANES>();
+        for (((u, v), f), (m, i)) in us.iter_mut().zip(vs).zip(fs).zip(ms.iter().zip(is)) {
+            Self::some(&kick, by, [u, v], [f, m, i], &mut squares);
+        }
+        Self::some(&kick, by, [u, v], [f, m, i], &mut squares);
+        for ((damped, u), v) in damped.iter_mut().zip(displacement).zip(velocity) {
+            *damped = *u + tau * *v;
         }
         squares.iter().sum()
     }

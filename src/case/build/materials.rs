@@ -12,7 +12,6 @@ use crate::discretization::heterogeneity::PairTable;
 use crate::error::{Error, Result};
 use crate::execution::Packs;
 use crate::family::Body;
-use crate::field::Number;
 use crate::geometry::Cloud;
 use crate::output::source::MaterialSummary;
 use crate::physics::elasticity::Elasticity;
@@ -309,15 +308,10 @@ impl<const D: usize> Builder<'_, D> {
             });
             let (bar_speed, longitudinal_speed, shear_speed, rayleigh_speed) = speeds(&fastest.unwrap_or(*reference));
             // Of the rows of its points: all others as if they could not move.
-            let mut density = elasticity.density.clone();
-            if let Some(found) = composition.filter(|found| found.names.len() > 1) {
-                density.relative.resize(found.material.len(), P::Field::from_f64(1.0));
-                for (relative, material) in density.relative.iter_mut().zip(&found.material) {
-                    if *material != k as u8 {
-                        *relative = P::Field::from_f64(1e30);
-                    }
-                }
-            }
+            let density = match composition.filter(|found| found.names.len() > 1) {
+                None => elasticity.density.clone(),
+                Some(found) => elasticity.density.only(found.material.len(), |slot| found.material[slot] == k as u8),
+            };
             let (material, mut on, _) = elasticity.parts();
             let stable_step = material.stable_step(&mut on, &density);
             let failure = on.failure;

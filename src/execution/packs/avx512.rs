@@ -106,6 +106,12 @@ impl Pack<f64> for F64 {
         unsafe { F64([_mm512_maskz_mov_pd(low, self.0[0]), _mm512_maskz_mov_pd(high, self.0[1])]) }
     }
     #[inline(always)]
+    fn with(self, other: Self, mask: u16) -> Self {
+        let [low, high] = halves(mask);
+        let (a, b) = (self.0, other.0);
+        unsafe { F64([_mm512_mask_mov_pd(a[0], low, b[0]), _mm512_mask_mov_pd(a[1], high, b[1])]) }
+    }
+    #[inline(always)]
     fn larger(self, other: Self) -> Self {
         let (a, b) = (self.0, other.0);
         unsafe { F64([_mm512_range_pd::<LARGER>(a[0], b[0]), _mm512_range_pd::<LARGER>(a[1], b[1])]) }
@@ -174,6 +180,10 @@ impl Pack<f32> for F32 {
     #[inline(always)]
     fn keep(self, mask: u16) -> Self {
         unsafe { F32(_mm512_maskz_mov_ps(mask, self.0)) }
+    }
+    #[inline(always)]
+    fn with(self, other: Self, mask: u16) -> Self {
+        unsafe { F32(_mm512_mask_mov_ps(self.0, mask, other.0)) }
     }
     #[inline(always)]
     fn larger(self, other: Self) -> Self {

@@ -78,6 +78,12 @@ pub trait Pack<B: Number>: Lane {
     fn broadcast(x: B) -> Self;
     /// Keeps the lanes whose bit is set, zeroes the others. Bits beyond the lanes are ignored.
     fn keep(self, mask: u16) -> Self;
+    /// `other` in the lanes whose bit is set.
+    #[inline(always)]
+    fn with(self, other: Self, mask: u16) -> Self {
+        // One of both is zero in each lane: exactly the other.
+        self.keep(!mask) + other.keep(mask)
+    }
     /// The larger of |self| and |other| in each lane; of a number and a NaN, the number.
     fn larger(self, other: Self) -> Self;
     /// Between zero and one: what lies outside is drawn to the nearer of them.

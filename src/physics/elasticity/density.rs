@@ -8,14 +8,15 @@ use crate::field::Number;
 pub struct Density<F> {
     /// ρ₀, kg/m³ (2D: unit thickness; 1D: unit cross-section): of all points, or what theirs are multiples of.
     pub unit: f64,
-    /// ρ/ρ₀ by slot; empty where all points have ρ₀.
-    pub relative: Vec<F>,
+    /// ρ/ρ₀ by slot, and ρ₀/ρ; empty where all points have ρ₀.
+    relative: Vec<F>,
+    inverse: Vec<F>,
 }
 
 impl<F: Number> Density<F> {
     /// Of all points, kg/m³.
     pub fn same(density: f64) -> Self {
-        Density { unit: density, relative: Vec::new() }
+        Density { unit: density, relative: Vec::new(), inverse: Vec::new() }
     }
 
     /// ρ by slot, kg/m³; zero where there is no point.
@@ -25,8 +26,29 @@ impl<F: Number> Density<F> {
             return Density::same(unit);
         }
         // A slot without a point is at rest whatever it weighs.
-        let relative = |&density: &f64| F::from_f64(if density > 0.0 { density / unit } else { 1.0 });
-        Density { unit, relative: densities.iter().map(relative).collect() }
+        let relative = |&density: &f64| if density > 0.0 { density / unit } else { 1.0 };
+        Density {
+            unit,
+            relative: densities.iter().map(|density| F::from_f64(relative(density))).collect(),
+            inverse: densities.iter().map(|density| F::from_f64(1.0 / relative(density))).collect(),
+        }
+    }
+
+    /// ρ/ρ₀ and ρ₀/ρ by slot; None where all points have ρ₀.
+    pub fn relative_and_inverse(&self) -> Option<[&[F]; 2]> {
+        (!self.is_same()).then_some([&self.relative[..], &self.inverse[..]])
+    }
+
+    /// The same, but so inert that nothing moves it where `moves` does not hold.
+    pub fn only(&self, n_slots: usize, moves: impl Fn(usize) -> bool) -> Self {
+        let relative = |slot: usize| if moves(slot) { self.at(slot) / self.unit } else { 1e30 };
+        let relative: Vec<F> = (0..n_slots).map(|slot| F::from_f64(relative(slot))).collect();
+        Density { unit: self.unit, inverse: relative.iter().map(|m| F::from_f64(1.0 / m.to_f64())).collect(), relative }
+    }
+
+    /// Bytes.
+    pub fn memory(&self) -> usize {
+        size_of_val(&self.relative[..]) + size_of_val(&self.inverse[..])
     }
 
     /// kg/m³
@@ -59,7 +81,9 @@ impl<F: Number> Density<F> {
 
     /// For points of which each is of the material of one before: `from` by slot.
     pub fn inherited(&self, from: &[usize]) -> Self {
-        let relative = if self.is_same() { Vec::new() } else { from.iter().map(|&old| self.relative[old]).collect() };
-        Density { unit: self.unit, relative }
+        let inherited = |values: &[F]| {
+            if values.is_empty() { Vec::new() } else { from.iter().map(|&old| values[old]).collect() }
+        };
+        Density { unit: self.unit, relative: inherited(&self.relative), inverse: inherited(&self.inverse) }
     }
 }

@@ -228,7 +228,7 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
     fn unknown(&mut self) -> Unknown<'_> {
         let State { displacement, velocity, force, .. } = &mut self.state;
         let damped = self.material.damped();
-        let relative_inertia = (!self.density.is_same()).then_some(&self.density.relative[..]);
+        let relative_inertia = self.density.relative_and_inverse();
         Unknown {
             vectors: P::Field::numbers(Vectors {
                 value: displacement,
@@ -496,7 +496,7 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
         let cloud = &self.body.cloud;
         let fields = (3 * D + 1) * size_of::<P::Field>() * cloud.n_slots()
             + size_of_val(&cloud.slots[..])
-            + size_of_val(&self.density.relative[..])
+            + self.density.memory()
             + self.materials.len();
         let classes = self.failure.as_ref().map_or(0, CriticalStretch::memory);
         let points = match &cloud.arrangement {
