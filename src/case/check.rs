@@ -1,5 +1,7 @@
 //! Rules across keys: what one key alone cannot tell. Each mistake is located at the key that has to change.
 
+mod diffusion;
+
 use std::collections::BTreeSet;
 
 use super::diagnostics::Diagnostic;
@@ -58,25 +60,31 @@ impl Checker<'_> {
             self.region(region, dimension, &path);
         }
         self.discretization(case);
-        self.refinement(case);
-        self.correction(case);
+        self.physics(case);
+        if case.physics.elasticity.is_some() {
+            self.refinement(case);
+            self.correction(case);
+        }
         let imported = case.geometry.points.is_some();
         let mut used = BTreeSet::new();
         if let Scheme::Hybrid(hybrid) = &case.discretization.scheme {
-            self.hybrid(hybrid, case);
+            if case.physics.elasticity.is_some() {
+                self.hybrid(hybrid, case);
+            }
             for (k, name) in hybrid.standard.iter().enumerate() {
                 let path = format!("discretization.scheme.hybrid.standard[{k}]");
                 self.set_name(name, case, imported, &path, &mut used);
             }
         }
-        let elasticity = &case.physics.elasticity;
-        let path = format!("physics.elasticity.law.{}", elasticity.law.of().name());
-        self.law(&elasticity.law, dimension, &path);
-        if elasticity.law.of().is_state_based() {
-            self.state_based(case);
-        }
-        if let Some(super::model::Failure::CriticalStretch(failure)) = &elasticity.failure {
-            self.failure(failure, case, imported, &mut used);
+        if let Some(elasticity) = &case.physics.elasticity {
+            let path = format!("physics.elasticity.law.{}", elasticity.law.of().name());
+            self.law(&elasticity.law, dimension, &path);
+            if elasticity.law.of().is_state_based() {
+                self.state_based(case);
+            }
+            if let Some(super::model::Failure::CriticalStretch(failure)) = &elasticity.failure {
+                self.failure(failure, case, imported, &mut used);
+            }
         }
         for (k, condition) in case.conditions.iter().enumerate() {
             let path = format!("conditions[{k}]");
@@ -99,12 +107,10 @@ impl Checker<'_> {
                 self.error(&format!("{path}.until"), message, "remove it");
             }
             for (key, motion) in [("initial", &condition.initial), ("prescribe", &condition.prescribe)] {
-                if let Some(motion) = motion {
-                    let (field, component) = match motion {
-                        Motion::Displacement { component, .. } => ("displacement", *component),
-                        Motion::Velocity { component, .. } => ("velocity", *component),
-                    };
-                    self.component(component, dimension, &format!("{path}.{key}.{field}.component"));
+                if let Some(motion @ (Motion::Displacement { component, .. } | Motion::Velocity { component, .. })) =
+                    motion
+                {
+                    self.component(*component, dimension, &format!("{path}.{key}.{}.component", motion.name()));
                 }
             }
             match &condition.load {
@@ -175,6 +181,10 @@ impl Checker<'_> {
                     let message = "`safety` and `time_step` are both given; only one may be";
                     self.error(&format!("{path}.time_step"), message, "remove one of them");
                 }
+                Solver::ForwardEuler(s) if s.safety.is_some() && s.time_step.is_some() => {
+                    let message = "`safety` and `time_step` are both given; only one may be";
+                    self.error(&format!("{path}.time_step"), message, "remove one of them");
+                }
                 Solver::Static(s) | Solver::Newton(s) | Solver::QuasiStatic(s)
                     if s.linear == LinearSolver::Direct && s.preconditioner.is_some() =>
                 {
@@ -183,7 +193,7 @@ impl Checker<'_> {
                 }
                 _ => {}
             }
-            if !any && case.physics.elasticity.failure.is_some() {
+            if !any && case.physics.elasticity.as_ref().is_some_and(|elasticity| elasticity.failure.is_some()) {
                 let message = format!(
                     "no bond breaks in `{path}`; they do in `quasi_static`, `velocity_verlet` and `runge_kutta`"
                 );

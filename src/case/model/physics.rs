@@ -5,11 +5,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::physics::elasticity::laws;
 
-/// What the body is made of.
+use super::Diffusion;
+
+/// What happens in the body: exactly one of these.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Physics {
-    pub elasticity: Elasticity,
+    pub elasticity: Option<Elasticity>,
+    pub diffusion: Option<Diffusion>,
+}
+
+impl Physics {
+    /// That of a case in which nothing diffuses.
+    ///
+    /// # Panics
+    /// Of a case without elasticity, which the rules across keys refuse.
+    pub fn elastic(&self) -> &Elasticity {
+        self.elasticity.as_ref().expect("a checked case without diffusion has elasticity")
+    }
 }
 
 /// An elastic solid that may break.
