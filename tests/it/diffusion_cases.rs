@@ -114,8 +114,8 @@ fn books(simulation: &mut Simulation) -> [f64; 3] {
     std::array::from_fn(|k| columns[k].value)
 }
 
-/// cos πx cos πy cos πz e^(−Dπ²t), prescribed in a layer of one horizon.
-fn wave(dimension: usize, spacing: f64) -> Parts {
+/// cos πx cos πy cos πz e^(−Dπ²t), prescribed in a layer of this width.
+fn wave(dimension: usize, spacing: f64, width: f64) -> Parts {
     let formula = ["cos(pi*x)", "cos(pi*y)", "cos(pi*z)"][..dimension].join("*");
     let far =
         ["abs(x)", "abs(y)", "abs(z)"][..dimension].iter().fold("0".into(), |m: String, x| format!("max({m}, {x})"));
@@ -129,8 +129,7 @@ initial = {{ concentration = {{ value = "{formula}" }} }}
 [[conditions]]
 on = "layer"
 prescribe = {{ concentration = {{ value = "{formula}*exp(-{dimension}*pi^2*t)" }} }}
-"#,
-        width = 3.0 * spacing
+"#
     );
     Parts { conditions, solver: "end_time = 0.02".into(), ..Parts::new(dimension, spacing) }
 }
@@ -150,22 +149,22 @@ fn error_of_wave(parts: &Parts) -> f64 {
 #[test]
 fn a_wave_decays_at_the_known_rate_with_the_order_of_the_scheme() {
     let rows = "horizon_ratio = 3\nscheme = { collocation = { order = 2 } }";
-    for (dimension, spacing) in [(1, 1.0 / 30.0), (2, 1.0 / 30.0), (3, 1.0 / 18.0)] {
+    let mut found = Vec::new();
+    for (dimension, spacing) in [(1, 1.0 / 60.0), (2, 1.0 / 30.0), (3, 1.0 / 18.0)] {
         for (discretization, perturb, least) in [
-            ("horizon_ratio = 3", None, 1.85),
-            ("horizon_ratio = 3\ninfluence = \"linear\"\npartial_volumes = \"none\"", None, 1.85),
-            (rows, None, 1.85),
+            ("horizon_ratio = 3", None, 1.8),
+            ("horizon_ratio = 3\ninfluence = \"linear\"\npartial_volumes = \"none\"", None, 1.8),
+            (rows, None, 1.8),
             // Of points that are moved the third derivative is left, with signs that vary.
             (rows, Some(0.15), 1.3),
         ] {
-            let error = |spacing| error_of_wave(&Parts { discretization, perturb, ..wave(dimension, spacing) });
+            let error = |h| error_of_wave(&Parts { discretization, perturb, ..wave(dimension, h, 3.0 * spacing) });
             let errors = [error(spacing), error(0.5 * spacing)];
-            let order = (errors[0] / errors[1]).log2();
-            println!("{dimension}D {discretization:?} {perturb:?}: {errors:?} {order}");
-            // From above: fewer cells lie in the layer, whose values are exact, as they shrink.
-            assert!(order > least && order < 2.6, "{dimension}D {discretization} {perturb:?}: {errors:?} {order}");
+            found.push((dimension, discretization, perturb, errors, (errors[0] / errors[1]).log2(), least));
         }
     }
+    let is_off = |order: f64, least: f64| order < least || order > 2.3;
+    assert!(!found.iter().any(|(.., order, least)| is_off(*order, *least)), "{found:#?}");
 }
 
 #[test]
@@ -174,7 +173,7 @@ fn the_error_of_the_step_is_of_first_order_for_every_exponent() {
         let value = |steps: u32| {
             let solver = format!("end_time = 0.02\ntime_step = {:?}", 0.02 / f64::from(steps));
             let diffusion = format!("diffusivity = 1.0\n{exponent}").leak();
-            let parts = Parts { solver, diffusion, ..wave(2, 1.0 / 20.0) };
+            let parts = Parts { solver, diffusion, ..wave(2, 1.0 / 20.0, 0.15) };
             let mut simulation = finished(parts.simulation());
             concentration(&mut simulation)[210]
         };
@@ -212,7 +211,7 @@ fn a_pre_crack_insulates() {
                 perturb,
                 cracks: cracks[dimension - 1],
                 conditions: "[[conditions]]\non = \"all\"\ninitial = { concentration = { value = \"1 + x\" } }".into(),
-                solver: "end_time = 2.0\nsafety = 0.9".into(),
+                solver: "end_time = 4.0\nsafety = 0.9".into(),
                 ..Parts::new(dimension, spacing)
             };
             let mut simulation = parts.simulation();
@@ -233,7 +232,8 @@ fn a_pre_crack_insulates() {
                 let moved = (after[part] / before[part] - 1.0).abs();
                 // Each of some thousand steps rounds the values once.
                 assert!(moved < 1e-12, "{dimension}D {perturb:?}: {moved:e}");
-                // The slowest wave of the larger part decays by e^(−π²t/0.6²), e^−55, less where surfaces lack bonds.
+                // The slowest wave of the larger part decays by e^(−π²t/0.6²), e^−110; with ten cells along a side, and
+                // surfaces that lack bonds, by e^−42 at least.
                 let mean = before[part] / sizes[part];
                 let off =
                     now.iter().zip(&side).filter(|(_, s)| usize::from(**s) == part).map(|(c, _)| (c - mean).abs());
@@ -440,11 +440,15 @@ fn a_run_writes_the_columns_and_the_report_of_diffusion() {
     let text = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
     assert!(text("history.csv").starts_with("step,time,amount,supplied,imbalance\n"), "{}", text("history.csv"));
     assert!(text("probe_a.csv").starts_with("step,time,concentration\n"), "{}", text("probe_a.csv"));
-    assert!(text("frames/frame_00000000.vtu").contains("concentration"));
+    let frame = std::fs::read(folder.join("frames/frame_00000000.vtu")).unwrap();
+    assert!(String::from_utf8_lossy(&frame).contains("concentration"));
     let drawn: Vec<_> = std::fs::read_dir(folder.join("pictures")).unwrap().collect();
     assert_eq!(drawn.len(), 1);
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+/// Rows with waves that grow, by the symbol and by power iteration.
+const GROWS: &str = "scheme = { collocation = { order = 4, points = 49 } }";
 
 /// What is changed in a sound case, and what is said about it.
 #[test]
@@ -504,13 +508,13 @@ prescribe = { concentration = { value = 1.0 } }
         ),
         (
             ratio,
-            "horizon_ratio = 4\nscheme = { collocation = { order = 4, points = 49 } }".into(),
-            &["discretization.scheme: ", "rows of collocation need the whole ball", "the first at (-0.275, -0.275) m", "prescribe"],
+            format!("horizon_ratio = 4\n{GROWS}"),
+            &["discretization.scheme.collocation: ", "would grow in time: an eigenvalue of +32.08 K/δ²", "`standard`"],
         ),
         (
-            ratio,
-            "horizon_ratio = 3\nscheme = { collocation = { order = 4, points = 29, exponent = 1 } }".into(),
-            &["discretization.scheme.collocation: ", "would grow in time: an eigenvalue of +", "`standard`"],
+            "\n\n\n[discretization]\nhorizon_ratio = 3",
+            format!("\nperturb = {{ amplitude = 0.05 }}\n[discretization]\nhorizon_ratio = 4\n{GROWS}"),
+            &["discretization.scheme.collocation: ", "rows of these points would grow in time", "t = 0.01 s bears 2.303e2 1/s"],
         ),
         (
             "[discretization]\nhorizon_ratio = 3",
