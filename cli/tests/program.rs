@@ -303,7 +303,9 @@ fn diffusion_is_spoken_of_in_its_own_words() {
     let (code, ran, error) = place.call(&["run", "diffusion_in_a_square", "--out", "results", "--set", short]);
     assert_eq!((code, error.as_str()), (0, ""));
     assert!(ran.contains("amount: "), "{ran}");
-    for word in ["micromodulus", "Rayleigh", "bar wave", "stretch", "surface effect", "energy", "broken", "damaged", "tip"] {
+    for word in
+        ["micromodulus", "Rayleigh", "bar wave", "stretch", "surface effect", "energy", "broken", "damaged", "tip"]
+    {
         assert!(!checked.contains(word) && !ran.contains(word), "`{word}` in\n{checked}\n{ran}");
     }
     let report = place.report("results");
