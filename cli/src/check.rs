@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use bondwise::Result;
 use bondwise::case::build::{Options, available_memory, load};
-use bondwise::output::source::MaterialSummary;
+use bondwise::output::source::{DiffusiveSummary, ElasticSummary, MaterialSummary, PhysicsSummary};
 
 use crate::{CaseArgs, on_threads, say};
 
@@ -18,23 +18,10 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
         say!("bonds (directed)  {}, of which pre-cracks cut {}", facts.bonds, facts.cut_bonds);
         say!("spacing           {:.6e} m", facts.spacing);
         say!("horizon           {:.6e} m, ratio {:.4}", facts.horizon, facts.horizon / facts.spacing);
-        say!("micromodulus      {:.6e}", facts.micromodulus);
-        match facts.critical_stretch {
-            Some(s) => say!("critical stretch  {s:.6e}"),
-            None => say!("critical stretch  none: bonds never break"),
+        match &facts.physics {
+            PhysicsSummary::Elastic(facts) => elastic(facts),
+            PhysicsSummary::Diffusive(facts) => diffusive(facts),
         }
-        let surface = &facts.surface;
-        say!(
-            "surface effect    {:.1} % of the points off by more than 1 %; softest {:.3}; body {:.2} % too soft",
-            100.0 * surface.points_affected,
-            surface.softest,
-            100.0 * surface.mean_deficit
-        );
-        say!("bar wave speed    {:.1} m/s", facts.bar_speed);
-        if let Some(speed) = facts.rayleigh_speed {
-            say!("Rayleigh speed    {speed:.1} m/s");
-        }
-        materials(&facts.materials);
         say!("stable step       {:.6e} s", facts.stable_step * simulation.solver.stability());
         let steps = simulation.stages_to_come.front().map_or(simulation.n_steps, |leg| leg.first);
         let end = steps as f64 * simulation.clock.dt;
@@ -48,7 +35,11 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
             say!("free memory       {:.1} MiB", mib(free));
         }
         say!("neighbours of a point (bonds that hold at the start):");
-        histogram(&families);
+        let alone = match &facts.physics {
+            PhysicsSummary::Elastic(_) => "they fly free",
+            PhysicsSummary::Diffusive(_) => "nothing reaches them",
+        };
+        histogram(&families, alone);
         Ok(ExitCode::SUCCESS)
     })?
 }
@@ -88,8 +79,45 @@ fn materials(list: &[MaterialSummary]) {
     }
 }
 
-/// At most twelve bars of equal width.
-fn histogram(sizes: &[u32]) {
+fn elastic(facts: &ElasticSummary) {
+    say!("micromodulus      {:.6e}", facts.micromodulus);
+    match facts.critical_stretch {
+        Some(s) => say!("critical stretch  {s:.6e}"),
+        None => say!("critical stretch  none: bonds never break"),
+    }
+    let surface = &facts.surface;
+    say!(
+        "surface effect    {:.1} % of the points off by more than 1 %; softest {:.3}; body {:.2} % too soft",
+        100.0 * surface.points_affected,
+        surface.softest,
+        100.0 * surface.mean_deficit
+    );
+    say!("bar wave speed    {:.1} m/s", facts.bar_speed);
+    if let Some(speed) = facts.rayleigh_speed {
+        say!("Rayleigh speed    {speed:.1} m/s");
+    }
+    materials(&facts.materials);
+}
+
+fn diffusive(facts: &DiffusiveSummary) {
+    say!("diffusivity       {:.6e} m^2/s", facts.diffusivity);
+    match facts.found_diffusivity {
+        Some(found) => say!("found by waves    {found:.6e} m^2/s, ratio {:.4}", found / facts.diffusivity),
+        None => say!("found by waves    not known of scattered points"),
+    }
+    say!("micro-diffusivity {:.6e}, flux by 1/distance^{}", facts.micro_diffusivity, facts.exponent);
+    let width = facts.materials.iter().map(|material| material.name.len()).max().unwrap_or(0).max(8);
+    if !facts.materials.is_empty() {
+        say!("{:<width$} {:>9} {:>11} {:>14}", "material", "points", "volume", "m^2/s");
+    }
+    for material in &facts.materials {
+        let (points, volume) = (material.points, material.volume);
+        say!("{:<width$} {points:>9} {volume:>11.4e} {:>14.6e}", material.name, material.diffusivity);
+    }
+}
+
+/// At most twelve bars of equal width. `alone`: what becomes of points without a bond.
+fn histogram(sizes: &[u32], alone: &str) {
     let (Some(&least), Some(&most)) = (sizes.iter().min(), sizes.iter().max()) else { return };
     let mean = sizes.iter().map(|&n| f64::from(n)).sum::<f64>() / sizes.len() as f64;
     let width = (most - least) / 12 + 1;
@@ -107,6 +135,6 @@ fn histogram(sizes: &[u32]) {
     say!("fewest {least}, mean {mean:.1}, most {most}");
     let lonely = sizes.iter().filter(|&&n| n == 0).count();
     if lonely > 0 {
-        say!("warning: {lonely} points have no bond at all; they fly free");
+        say!("warning: {lonely} points have no bond at all; {alone}");
     }
 }

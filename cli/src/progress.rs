@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::say;
 
-/// Shows step, time, rate, time left, imbalance and broken bonds.
+/// Shows step, time, rate, time left, imbalance and, where they can, broken bonds.
 pub struct Line {
     bar: Option<ProgressBar>,
     quiet: bool,
@@ -60,22 +60,22 @@ impl Line {
 
 fn text(p: &Progress) -> String {
     let rate = p.step as f64 / p.seconds.max(1e-9);
+    let broken = p.broken_bonds.map_or(String::new(), |broken| format!("  broken {broken}"));
     let left = (p.n_steps - p.step) as f64 / rate.max(1e-9);
     if let Some((iterations, imbalance)) = p.within {
         return format!(
-            "step {}/{}  t {:.4e} s  iteration {iterations} of the next, forces out of balance by {imbalance:.1e}  broken {}",
-            p.step, p.n_steps, p.time, p.broken_bonds
+            "step {}/{}  t {:.4e} s  iteration {iterations} of the next, forces out of balance by {imbalance:.1e}{broken}",
+            p.step, p.n_steps, p.time
         );
     }
     format!(
-        "step {}/{}  t {:.4e} s  {:.0} steps/s  {} left  imbalance {:.1e}  broken {}",
+        "step {}/{}  t {:.4e} s  {:.0} steps/s  {} left  imbalance {:.1e}{broken}",
         p.step,
         p.n_steps,
         p.time,
         rate,
         clock(left),
-        p.imbalance,
-        p.broken_bonds
+        p.imbalance
     )
 }
 

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use bondwise::Result;
 use bondwise::case::build::{Options, load};
 use bondwise::output::report::Report;
+use bondwise::output::source::ElasticSummary;
 use bondwise::simulation::{Control, prepare_folder};
 use bondwise::solver::statics::LoadStep;
 
@@ -36,12 +37,13 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
                 simulation.threads,
                 folder.display()
             );
-            let surface = &facts.surface;
-            say!(
-                "surface effect: {:.1} % of the points are off, the softest has {:.2} of its stiffness",
-                100.0 * surface.points_affected,
-                surface.softest
-            );
+            if let Some(ElasticSummary { surface, .. }) = facts.physics.elastic() {
+                say!(
+                    "surface effect: {:.1} % of the points are off, the softest has {:.2} of its stiffness",
+                    100.0 * surface.points_affected,
+                    surface.softest
+                );
+            }
         }
         let stop = Arc::new(AtomicBool::new(false));
         let asked = stop.clone();
@@ -65,11 +67,11 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
     if !args.quiet {
         summary(&report, &folder);
     }
-    if report.energy_imbalance > IMBALANCE {
+    if let Some(imbalance) = report.energy_imbalance.filter(|imbalance| *imbalance > IMBALANCE) {
         eprintln!(
             "warning: the energy balance is off by {:.1} % of what came in\n    help: a smaller step, or loads and \
              initial values that start more gently; see the column `imbalance` of history.csv",
-            100.0 * report.energy_imbalance
+            100.0 * imbalance
         );
     }
     Ok(if report.status == "interrupted" { ExitCode::from(130) } else { ExitCode::SUCCESS })
@@ -90,17 +92,28 @@ fn free_folder(case: &Path) -> PathBuf {
 }
 
 fn summary(report: &Report, folder: &Path) {
-    let e = &report.energy;
     say!("{} after {} steps, t = {:.6e} s", report.status, report.steps, report.end_time);
-    say!(
-        "energy: kinetic {:.6e}, strain {:.6e}, fracture {:.6e}, external work {:.6e} J; largest imbalance {:.2e}",
-        e.kinetic,
-        e.strain,
-        e.fracture,
-        e.external,
-        report.energy_imbalance
-    );
-    say!("broken bonds: {}; damaged points: {}", report.broken_bonds, report.damaged_points);
+    if let (Some(e), Some(imbalance)) = (&report.energy, report.energy_imbalance) {
+        say!(
+            "energy: kinetic {:.6e}, strain {:.6e}, fracture {:.6e}, external work {:.6e} J; largest imbalance {imbalance:.2e}",
+            e.kinetic,
+            e.strain,
+            e.fracture,
+            e.external
+        );
+    }
+    if let (Some(broken), Some(damaged)) = (report.broken_bonds, report.damaged_points) {
+        say!("broken bonds: {broken}; damaged points: {damaged}");
+    }
+    if let Some(diffusion) = &report.diffusion {
+        let book = |name: &str| report.books.get(name).and_then(|value| value.as_f64()).unwrap_or(f64::NAN);
+        say!(
+            "amount: {:.6e}, of which supplied {:.6e}; largest imbalance {:.2e}",
+            book("amount"),
+            book("supplied"),
+            diffusion.imbalance
+        );
+    }
     if let Some(tip) = &report.crack_tip {
         let place = tip
             .position

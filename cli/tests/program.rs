@@ -291,6 +291,29 @@ fn check_says_what_a_run_would_do_and_changes_nothing() {
 }
 
 #[test]
+fn diffusion_is_spoken_of_in_its_own_words() {
+    let place = Place::new("diffusion");
+    assert_eq!(place.call(&["new", "diffusion_in_a_square"]).0, 0);
+    let (code, checked, error) = place.call(&["check", "diffusion_in_a_square"]);
+    assert_eq!((code, error.as_str()), (0, ""));
+    for part in ["diffusivity       1.000000e0 m^2/s", "found by waves    1.000000e0 m^2/s", "micro-diffusivity"] {
+        assert!(checked.contains(part), "no `{part}` in\n{checked}");
+    }
+    let short = "solver.forward_euler.end_time=0.02";
+    let (code, ran, error) = place.call(&["run", "diffusion_in_a_square", "--out", "results", "--set", short]);
+    assert_eq!((code, error.as_str()), (0, ""));
+    assert!(ran.contains("amount: "), "{ran}");
+    for word in
+        ["micromodulus", "Rayleigh", "bar wave", "stretch", "surface effect", "energy", "broken", "damaged", "tip"]
+    {
+        assert!(!checked.contains(word) && !ran.contains(word), "`{word}` in\n{checked}\n{ran}");
+    }
+    let report = place.report("results");
+    assert!(report["energy"].is_null() && report["micromodulus"].is_null(), "{report:#}");
+    assert_eq!(report["diffusion"]["diffusivity"], 1.0);
+}
+
+#[test]
 fn a_run_whose_numbers_explode_stops_and_says_where_and_why() {
     let place = Place::new("explodes");
     let args = ["run", "case.toml", "--out", "results", "--set", "conditions.0.prescribe.velocity.value=1e160"];

@@ -1,6 +1,7 @@
 //! From a checked case to a simulation: the only place where dimension and law become types.
 
 mod conditions;
+mod diffusion;
 mod geometry;
 mod hybrid;
 mod materials;
@@ -13,7 +14,7 @@ use std::time::Instant;
 use super::bundled;
 use super::check::check;
 use super::diagnostics::{Diagnostic, Severity};
-use super::model::{self, Case, Motion, Output, PartialVolumes, Plane, Precision, Scheme, SurfaceCorrection};
+use super::model::{self, Case, Motion, Output, Plane, Precision, Scheme, SurfaceCorrection};
 use super::read::{Located, Source};
 use crate::conditions::initial;
 use crate::discretization::{BondWeighting, Correction, Influence, Operator, PartialVolume, standard};
@@ -28,7 +29,7 @@ use crate::output::history::History;
 use crate::output::pictures::Pictures;
 use crate::output::probe::Probe;
 use crate::output::schedule::Schedule;
-use crate::output::source::BodySummary;
+use crate::output::source::{BodySummary, ElasticSummary, PhysicsSummary};
 use crate::output::writer::Output as Written;
 use crate::physics::Physics;
 use crate::physics::elasticity::laws::Law;
@@ -43,8 +44,7 @@ use crate::solver::dynamic_relaxation::DynamicRelaxation;
 use crate::solver::linear_solver::{self, LinearSolver, Preconditioning};
 use crate::solver::newton::Newton;
 use crate::solver::statics::Method;
-use crate::solver::{Clock, RungeKutta, Solver, Statics, VelocityVerlet};
-use conditions::motion_name;
+use crate::solver::{Clock, ForwardEuler, RungeKutta, Solver, Statics, VelocityVerlet};
 pub use geometry::available_memory;
 use materials::Values;
 use outputs::{names, schedule, style, tip_window};
@@ -102,6 +102,9 @@ struct Builder<'a, const D: usize> {
 
 impl<const D: usize> Builder<'_, D> {
     fn simulation(&self) -> Result<Simulation> {
+        if let Some(diffusion) = &self.case.value.physics.diffusion {
+            return self.diffusing(diffusion);
+        }
         match self.case.value.discretization.precision {
             Precision::Double => self.in_precision::<Double>(),
             Precision::Single => self.in_precision::<Single>(),
@@ -110,7 +113,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     fn law(&self) -> Law {
-        self.case.value.physics.elasticity.law.of()
+        self.case.value.physics.elastic().law.of()
     }
 
     fn source(&self) -> &Source {
@@ -123,15 +126,11 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     fn in_precision<P: Packs>(&self) -> Result<Simulation> {
-        let parameters = &self.case.value.physics.elasticity.law.parameters();
+        let parameters = &self.case.value.physics.elastic().law.parameters();
         let case = &self.case.value;
         let shape = self.shape()?;
         let cracks = self.cracks()?;
-        let rule = match case.discretization.partial_volumes {
-            PartialVolumes::None => PartialVolume::None,
-            PartialVolumes::Ramp => PartialVolume::Ramp,
-            PartialVolumes::Exact => PartialVolume::Exact,
-        };
+        let rule = PartialVolume::from(case.discretization.partial_volumes);
         let influence = Influence::from(case.discretization.influence);
         let mut cloud = self.cloud(shape.as_ref(), rule)?;
         let horizon = self.horizon(&cloud)?;
@@ -223,7 +222,7 @@ impl<const D: usize> Builder<'_, D> {
         };
         let settings = match &case.discretization.scheme {
             Scheme::Hybrid(settings) => Some(settings),
-            Scheme::Standard => None,
+            Scheme::Standard | Scheme::Collocation(_) => None,
         };
         if settings.is_some_and(|settings| settings.rescale) {
             hybrid::rescale(&body, &mut operator, &scaling);
@@ -264,8 +263,10 @@ impl<const D: usize> Builder<'_, D> {
                 let (flat, component, value) = match motion {
                     Motion::Displacement { component, value } => (&mut state.displacement, *component, value),
                     Motion::Velocity { component, value } => (&mut state.velocity, *component, value),
+                    // Refused of elastic bodies.
+                    Motion::Concentration { .. } => continue,
                 };
-                let path = format!("conditions[{k}].initial.{}.value", motion_name(motion));
+                let path = format!("conditions[{k}].initial.{}.value", motion.name());
                 let mut profile = self.profile(value, &body.cloud, &slots, &path)?;
                 initial::apply(components_mut::<D, _>(flat)[component], &slots, &mut profile);
             }
@@ -293,12 +294,14 @@ impl<const D: usize> Builder<'_, D> {
             horizon,
             spacing: 0.0,
             stable_step,
-            bar_speed,
-            rayleigh_speed: materials.iter().filter_map(|m| m.rayleigh_speed).reduce(f64::max),
-            micromodulus: strength,
-            materials: if composition.is_some() { materials } else { Vec::new() },
-            critical_stretch: smallest,
-            surface,
+            physics: PhysicsSummary::Elastic(ElasticSummary {
+                bar_speed,
+                rayleigh_speed: materials.iter().filter_map(|m| m.rayleigh_speed).reduce(f64::max),
+                micromodulus: strength,
+                materials: if composition.is_some() { materials } else { Vec::new() },
+                critical_stretch: smallest,
+                surface,
+            }),
             memory: 0,
         };
         if let Some(adaptation) = adaptation {
@@ -342,7 +345,7 @@ impl<const D: usize> Builder<'_, D> {
                 Output::Vtu(vtu) => {
                     let schedule = schedule(vtu.every, vtu.every_steps, &[]);
                     self.files(&schedule, n_steps, dt, &format!("output[{k}].vtu"))?;
-                    let fields = names(&vtu.fields, &["displacement", "damage"]);
+                    let fields = names(&vtu.fields, facts.physics.fields_of_frames());
                     outputs.push(Written { schedule, writer: Box::new(Frames::new(folder, fields)) });
                 }
                 Output::Picture(picture) => {
@@ -364,7 +367,7 @@ impl<const D: usize> Builder<'_, D> {
                 }
                 Output::History(history) => every = history.every_steps,
                 Output::Probe(probe) => {
-                    let fields = names(&probe.fields, &["displacement", "velocity"]);
+                    let fields = names(&probe.fields, facts.physics.fields_of_probes());
                     let path = folder.join(format!("probe_{}.csv", probe.name));
                     let mut at = [0.0; 3];
                     at[..D].copy_from_slice(&probe.at);
@@ -374,7 +377,7 @@ impl<const D: usize> Builder<'_, D> {
                 Output::CrackTip(t) => {
                     let mut along = [0.0; 3];
                     along[..D].copy_from_slice(&t.along);
-                    tip = Some(CrackTip::new(along, t.threshold, tip_window(&facts)));
+                    tip = tip_window(&facts).map(|window| CrackTip::new(along, t.threshold, window));
                 }
             }
         }
@@ -414,11 +417,15 @@ impl<const D: usize> Builder<'_, D> {
                     let method = DynamicRelaxation { tolerance: s.tolerance, max_iterations: s.max_iterations };
                     (statics(Method::DynamicRelaxation(method), false, false), Some(s.steps))
                 }
+                model::Solver::ForwardEuler(_) => (Solver::ForwardEuler(ForwardEuler), None),
             };
             let length = chosen.end_time() - time;
             let (dt, n_steps) = match (chosen, steps) {
                 (model::Solver::VelocityVerlet(s) | model::Solver::RungeKutta(s), _) => {
-                    self.time_steps(s, &path, length, stable_step * solver.stability())?
+                    self.time_steps((s.safety, s.time_step), &path, length, stable_step * solver.stability())?
+                }
+                (model::Solver::ForwardEuler(s), _) => {
+                    self.time_steps((s.safety, s.time_step), &path, length, stable_step * solver.stability())?
                 }
                 (_, steps) => (length / steps.unwrap_or(1) as f64, steps.unwrap_or(1)),
             };
@@ -429,8 +436,15 @@ impl<const D: usize> Builder<'_, D> {
         Ok(legs)
     }
 
-    fn time_steps(&self, solver: &model::Explicit, path: &str, length: f64, stable_step: f64) -> Result<(f64, u64)> {
-        let (dt, n_steps) = match solver.time_step {
+    /// Δt and the number of steps, from `safety` and `time_step` as far as they are given.
+    fn time_steps(
+        &self,
+        (safety, time_step): (Option<f64>, Option<f64>),
+        path: &str,
+        length: f64,
+        stable_step: f64,
+    ) -> Result<(f64, u64)> {
+        let (dt, n_steps) = match time_step {
             Some(dt) => {
                 if dt > stable_step {
                     let message =
@@ -441,7 +455,7 @@ impl<const D: usize> Builder<'_, D> {
                 (dt, (length / dt - 1e-9).ceil().max(1.0))
             }
             None => {
-                let n = (length / (stable_step * solver.safety.unwrap_or(SAFETY))).ceil().max(1.0);
+                let n = (length / (stable_step * safety.unwrap_or(SAFETY))).ceil().max(1.0);
                 (length / n, n)
             }
         };

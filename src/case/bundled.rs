@@ -23,13 +23,15 @@ macro_rules! bundled {
 }
 
 /// All of them, in the order in which a newcomer may look at them.
-pub const CASES: [Bundled; 17] = [
+pub const CASES: [Bundled; 19] = [
     bundled!("crack_branching", "2D: a crack runs through glass and branches; the main example"),
     bundled!("crack_branching_refined", "2D: the same crack on cells that are fine about its tips only"),
     bundled!("crack_branching_hybrid", "2D: a larger plate, collocation where it is whole and bonds where it breaks"),
     bundled!("crack_branching_duran", "2D: the same plate in a tougher glass under a higher load"),
     bundled!("wave_in_bar", "1D: a pulse against its closed form; the smallest case"),
     bundled!("prestressed_bar", "1D: a bar rests under tension, then an end is let go; two solvers in a chain"),
+    bundled!("diffusion_two_layers", "1D: what diffuses through a wall of a good and a poor conductor"),
+    bundled!("diffusion_in_a_square", "2D: something diffuses, against a closed form; rows of collocation"),
     bundled!("wave_in_bar_3d", "3D: a bar runs against a wall; a compression wave and its return"),
     bundled!("plate_with_hole", "2D: a plate with a hole is pulled slowly until it rests"),
     bundled!("stretched_plate", "2D: a plate with the Poisson ratio of aluminium is pulled; state-based"),

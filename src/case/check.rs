@@ -1,5 +1,6 @@
 //! Rules across keys: what one key alone cannot tell. Each mistake is located at the key that has to change.
 
+mod diffusion;
 mod materials;
 
 use std::collections::BTreeSet;
@@ -60,27 +61,33 @@ impl Checker<'_> {
             self.region(region, dimension, &path);
         }
         self.discretization(case);
-        self.refinement(case);
-        self.correction(case);
+        self.physics(case);
+        if case.physics.elasticity.is_some() {
+            self.refinement(case);
+            self.correction(case);
+        }
         let imported = case.geometry.points.is_some();
         let mut used = BTreeSet::new();
         if let Scheme::Hybrid(hybrid) = &case.discretization.scheme {
-            self.hybrid(hybrid, case);
+            if case.physics.elasticity.is_some() {
+                self.hybrid(hybrid, case);
+            }
             for (k, name) in hybrid.standard.iter().enumerate() {
                 let path = format!("discretization.scheme.hybrid.standard[{k}]");
                 self.set_name(name, case, imported, &path, &mut used);
             }
         }
-        let elasticity = &case.physics.elasticity;
-        let path = format!("physics.elasticity.law.{}", elasticity.law.of().name());
-        self.law(&elasticity.law, dimension, &path, !elasticity.materials.is_empty());
+        if let Some(elasticity) = &case.physics.elasticity {
+            let path = format!("physics.elasticity.law.{}", elasticity.law.of().name());
+            self.law(&elasticity.law, dimension, &path, !elasticity.materials.is_empty());
+            if elasticity.law.of().is_state_based() {
+                self.state_based(case);
+            }
+            if let Some(super::model::Failure::CriticalStretch(failure)) = &elasticity.failure {
+                self.failure(failure, case, imported, &mut used);
+            }
+        }
         materials::check(self, case, &mut used);
-        if elasticity.law.of().is_state_based() {
-            self.state_based(case);
-        }
-        if let Some(super::model::Failure::CriticalStretch(failure)) = &elasticity.failure {
-            self.failure(failure, case, imported, &mut used);
-        }
         for (k, condition) in case.conditions.iter().enumerate() {
             let path = format!("conditions[{k}]");
             self.set_name(&condition.on, case, imported, &format!("{path}.on"), &mut used);
@@ -102,12 +109,10 @@ impl Checker<'_> {
                 self.error(&format!("{path}.until"), message, "remove it");
             }
             for (key, motion) in [("initial", &condition.initial), ("prescribe", &condition.prescribe)] {
-                if let Some(motion) = motion {
-                    let (field, component) = match motion {
-                        Motion::Displacement { component, .. } => ("displacement", *component),
-                        Motion::Velocity { component, .. } => ("velocity", *component),
-                    };
-                    self.component(component, dimension, &format!("{path}.{key}.{field}.component"));
+                if let Some(motion @ (Motion::Displacement { component, .. } | Motion::Velocity { component, .. })) =
+                    motion
+                {
+                    self.component(*component, dimension, &format!("{path}.{key}.{}.component", motion.name()));
                 }
             }
             match &condition.load {
@@ -178,6 +183,10 @@ impl Checker<'_> {
                     let message = "`safety` and `time_step` are both given; only one may be";
                     self.error(&format!("{path}.time_step"), message, "remove one of them");
                 }
+                Solver::ForwardEuler(s) if s.safety.is_some() && s.time_step.is_some() => {
+                    let message = "`safety` and `time_step` are both given; only one may be";
+                    self.error(&format!("{path}.time_step"), message, "remove one of them");
+                }
                 Solver::Static(s) | Solver::Newton(s) | Solver::QuasiStatic(s)
                     if s.linear == LinearSolver::Direct && s.preconditioner.is_some() =>
                 {
@@ -186,7 +195,7 @@ impl Checker<'_> {
                 }
                 _ => {}
             }
-            if !any && case.physics.elasticity.failure.is_some() {
+            if !any && case.physics.elasticity.as_ref().is_some_and(|elasticity| elasticity.failure.is_some()) {
                 let message = format!(
                     "no bond breaks in `{path}`; they do in `quasi_static`, `velocity_verlet` and `runge_kutta`"
                 );
@@ -528,9 +537,10 @@ impl Checker<'_> {
     ) {
         let path = "physics.elasticity.failure.critical_stretch";
         // Materials may have their own.
-        let elasticity = &case.physics.elasticity;
-        let own = !elasticity.materials.is_empty()
-            || elasticity.law.parameters().material.is_some_and(|material| material.values().fracture_energy.is_some());
+        let own = case.physics.elasticity.as_ref().is_some_and(|elasticity| {
+            let library = elasticity.law.parameters().material.map(|material| material.values());
+            !elasticity.materials.is_empty() || library.is_some_and(|values| values.fracture_energy.is_some())
+        });
         if !own || failure.fracture_energy.is_some() && failure.stretch.is_some() {
             self.either(
                 path,
@@ -566,7 +576,7 @@ impl Checker<'_> {
         used: &mut BTreeSet<&'a str>,
     ) {
         used.insert(name);
-        let materials = &case.physics.elasticity.materials;
+        let (_, materials) = case.physics.materials();
         if name == "all" || case.sets.contains_key(name) || materials.contains_key(name) || imported {
             return;
         }

@@ -4,6 +4,7 @@
 //! these types, so that a key stands in one place. `x-unit` names the unit of a number, `x-expression` the variables
 //! that a formula may use.
 
+mod diffusion;
 mod discretization;
 mod geometry;
 mod materials;
@@ -16,6 +17,7 @@ use std::collections::BTreeMap;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
+pub use diffusion::*;
 pub use discretization::*;
 pub use geometry::*;
 pub use materials::*;
@@ -68,15 +70,15 @@ pub struct Condition {
     pub on: String,
     /// Values at t = 0.
     pub initial: Option<Motion>,
-    /// Motion imposed while t ≤ until.
+    /// Values imposed while t ≤ until.
     pub prescribe: Option<Motion>,
     pub load: Option<Load>,
-    /// When a prescribed motion is released or a load ends.
+    /// When a prescribed value is released or a load ends.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
     pub until: Option<f64>,
 }
 
-/// One component of a motion.
+/// One component of a motion, or a concentration.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Motion {
@@ -96,9 +98,26 @@ pub enum Motion {
         #[schemars(extend("x-unit" = "m/s", "x-expression" = ["x", "y", "z", "t"]))]
         value: Formula,
     },
+    /// Of diffusion.
+    Concentration {
+        /// C, in whatever unit its user has: a number or a formula in x, y, z and t.
+        #[schemars(extend("x-unit" = "", "x-expression" = ["x", "y", "z", "t"]))]
+        value: Formula,
+    },
 }
 
-/// Forces from outside.
+impl Motion {
+    /// The key that chooses it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Motion::Displacement { .. } => "displacement",
+            Motion::Velocity { .. } => "velocity",
+            Motion::Concentration { .. } => "concentration",
+        }
+    }
+}
+
+/// What acts on the body or enters it from outside.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Load {
@@ -129,6 +148,34 @@ pub enum Load {
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0))]
         thickness: Option<f64>,
     },
+    /// Of diffusion: what is set free, per volume and second.
+    Source {
+        /// S, unit of C per second.
+        #[schemars(extend("x-unit" = "1/s", "x-expression" = ["x", "y", "z", "t"]))]
+        value: Formula,
+    },
+    /// Of diffusion: what enters through a face, per area and second, spread over the set as a layer.
+    Flux {
+        /// Inward, unit of C times m/s.
+        #[schemars(extend("x-unit" = "m/s", "x-expression" = ["x", "y", "z", "t"]))]
+        value: Formula,
+        /// Thickness of the layer that the set is; the spacing if not given (one row of cells).
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0))]
+        thickness: Option<f64>,
+    },
+}
+
+impl Load {
+    /// The key that chooses it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Load::BodyForce { .. } => "body_force",
+            Load::Traction { .. } => "traction",
+            Load::Pressure { .. } => "pressure",
+            Load::Source { .. } => "source",
+            Load::Flux { .. } => "flux",
+        }
+    }
 }
 
 /// A number, or a formula of place and time.

@@ -52,6 +52,11 @@ impl PointRows {
         let sums = (0..self.starts.len() - 1).map(|slot| self.row(slot).fold(0.0, |sum, (_, w)| sum + w.abs()));
         sums.fold(0.0, f64::max)
     }
+
+    /// Bytes of the entries.
+    pub fn memory(&self) -> usize {
+        size_of_val(&self.starts[..]) + size_of_val(&self.others[..]) + size_of_val(&self.weights[..])
+    }
 }
 
 #[cfg(test)]

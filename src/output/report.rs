@@ -28,11 +28,14 @@ pub struct Report {
     pub spacing: f64,
     /// Of a body of several materials; else empty.
     pub materials: Vec<MaterialSummary>,
-    /// Of the first material: N/m⁶ in 3D, N/m⁵ in 2D, N/m⁴ in 1D
-    pub micromodulus: f64,
+    /// Of the first material: N/m⁶ in 3D, N/m⁵ in 2D, N/m⁴ in 1D. This and all that follows of elasticity is null of other physics.
+    pub micromodulus: Option<f64>,
     /// The smallest of the body; null if bonds never break.
     pub critical_stretch: Option<f64>,
-    pub surface: SurfaceEffect,
+    pub surface: Option<SurfaceEffect>,
+    /// Absent of other physics.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffusion: Option<Diffusion>,
     pub steps: u64,
     /// s
     pub time_step: f64,
@@ -44,18 +47,17 @@ pub struct Report {
     pub bond_updates_per_second: f64,
     /// Null where the system does not tell.
     pub peak_memory_bytes: Option<u64>,
-    pub energy: Energy,
+    pub energy: Option<Energy>,
     /// The books at the end, by the names that the physics gives them: the columns of the history.
     pub books: serde_json::Map<String, serde_json::Value>,
-    /// Largest defect of what is kept over what it is measured against: of energy, the largest of external work and initial
-    /// energy.
-    pub energy_imbalance: f64,
+    /// Largest energy defect over the largest of external work and initial energy.
+    pub energy_imbalance: Option<f64>,
     /// Largest momentum defect over the largest Σ ρ |v| V.
-    pub momentum_error: f64,
+    pub momentum_error: Option<f64>,
     /// Pairs broken since the start.
-    pub broken_bonds: u64,
+    pub broken_bonds: Option<u64>,
     /// Points with φ > 0.35.
-    pub damaged_points: usize,
+    pub damaged_points: Option<usize>,
     pub crack_tip: Option<Tip>,
     /// Null where cells do not follow the solution.
     pub refinement: Option<Refinement>,
@@ -64,6 +66,21 @@ pub struct Report {
     /// Of static solvers, the one that was not finished included; empty for others.
     pub load_steps: Vec<LoadStep>,
     pub state_hash: String,
+}
+
+/// What diffused.
+#[derive(Debug, Clone, Copy, Serialize, PartialEq)]
+pub struct Diffusion {
+    /// K, m²/s.
+    pub diffusivity: f64,
+    /// That which long waves find, m²/s; null of scattered points.
+    pub found_diffusivity: Option<f64>,
+    /// κ of the integral, m^(q−D)/s.
+    pub micro_diffusivity: f64,
+    /// q
+    pub exponent: u32,
+    /// Largest of |amount − initial amount − what came in| over the largest Σ |C| V.
+    pub imbalance: f64,
 }
 
 /// What refinement has done.

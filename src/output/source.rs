@@ -84,6 +84,21 @@ pub struct BodySummary {
     pub spacing: f64,
     /// Largest stable step, s.
     pub stable_step: f64,
+    pub physics: PhysicsSummary,
+    /// Bytes that fields and bonds take.
+    pub memory: u64,
+}
+
+/// What is known of its physics.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PhysicsSummary {
+    Elastic(ElasticSummary),
+    Diffusive(DiffusiveSummary),
+}
+
+/// Of an elastic body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElasticSummary {
     /// √(E/ρ), m/s
     pub bar_speed: f64,
     /// m/s; None in 1D.
@@ -95,8 +110,66 @@ pub struct BodySummary {
     pub critical_stretch: Option<f64>,
     /// How incomplete families are at the start, corrected if asked.
     pub surface: SurfaceEffect,
-    /// Bytes that fields and bonds take.
-    pub memory: u64,
+}
+
+/// Of a body in which something diffuses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiffusiveSummary {
+    /// K, m²/s; of several materials that of the first point.
+    pub diffusivity: f64,
+    /// That which long waves find, m²/s; None of scattered points.
+    pub found_diffusivity: Option<f64>,
+    /// κ, m^(q−D)/s, of the integral.
+    pub micro_diffusivity: f64,
+    /// q
+    pub exponent: u32,
+    /// Where there are several.
+    pub materials: Vec<DiffusiveMaterial>,
+}
+
+/// What is known of a material in which something diffuses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiffusiveMaterial {
+    pub name: String,
+    pub points: usize,
+    /// m³; m² in 2D, m in 1D.
+    pub volume: f64,
+    /// K, m²/s; the largest where it varies.
+    pub diffusivity: f64,
+}
+
+impl PhysicsSummary {
+    /// None of other physics.
+    pub fn elastic(&self) -> Option<&ElasticSummary> {
+        match self {
+            PhysicsSummary::Elastic(elastic) => Some(elastic),
+            PhysicsSummary::Diffusive(_) => None,
+        }
+    }
+
+    /// None of other physics.
+    pub fn diffusive(&self) -> Option<&DiffusiveSummary> {
+        match self {
+            PhysicsSummary::Elastic(_) => None,
+            PhysicsSummary::Diffusive(diffusive) => Some(diffusive),
+        }
+    }
+
+    /// Fields of frames, where nothing else is asked for.
+    pub fn fields_of_frames(&self) -> &'static [&'static str] {
+        match self {
+            PhysicsSummary::Elastic(_) => &["displacement", "damage"],
+            PhysicsSummary::Diffusive(_) => &["concentration"],
+        }
+    }
+
+    /// Fields of probes, where nothing else is asked for.
+    pub fn fields_of_probes(&self) -> &'static [&'static str] {
+        match self {
+            PhysicsSummary::Elastic(_) => &["displacement", "velocity"],
+            PhysicsSummary::Diffusive(_) => &["concentration"],
+        }
+    }
 }
 
 /// What is known of a material before the first step; where its values vary, the fastest waves and the smallest step and critical

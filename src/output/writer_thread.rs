@@ -145,7 +145,7 @@ mod tests {
     use super::*;
     use crate::field::{Field, Values};
     use crate::output::snapshot::FieldRequest;
-    use crate::output::source::{BodySummary, Points};
+    use crate::output::source::{BodySummary, ElasticSummary, PhysicsSummary, Points};
     use crate::output::tests::folder;
     use crate::physics::elasticity::surface::SurfaceEffect;
     use crate::solver::Clock;
@@ -182,12 +182,14 @@ mod tests {
             horizon: 1.0,
             spacing: 1.0,
             stable_step: 1.0,
-            bar_speed: 1.0,
-            rayleigh_speed: None,
-            materials: Vec::new(),
-            micromodulus: 1.0,
-            critical_stretch: None,
-            surface: SurfaceEffect::default(),
+            physics: PhysicsSummary::Elastic(ElasticSummary {
+                bar_speed: 1.0,
+                rayleigh_speed: None,
+                materials: Vec::new(),
+                micromodulus: 1.0,
+                critical_stretch: None,
+                surface: SurfaceEffect::default(),
+            }),
             memory: 0,
         };
         let points = Arc::new(Points { positions: Vec::new(), sizes: Vec::new(), facts });

@@ -136,9 +136,9 @@ pub struct FieldInfo {
     pub about: &'static str,
 }
 
-/// The fields that cases may ask for: those of elastic bodies, the only ones that a case can make yet.
+/// The fields that cases may ask for, of one physics after another.
 pub fn all_fields() -> impl Iterator<Item = &'static FieldInfo> {
-    elasticity::fields()
+    elasticity::fields().chain(diffusion::fields())
 }
 
 /// The points of a body, whatever its dimension.

@@ -19,7 +19,7 @@ use crate::physics::{Physics, Points};
 use crate::solver::runge_kutta::Memory;
 use crate::solver::statics::LoadStep;
 use crate::solver::{Clock, Drift, Solver, Staged, System, VelocityVerlet};
-use crate::unknown::Unknown;
+use crate::unknown::{Unknown, with};
 use crate::visit::Visitor;
 
 /// Steps between two looks at the power of the damping inside a body.
@@ -93,7 +93,7 @@ impl Problem {
 
     /// Takes the velocities away.
     fn stop(&mut self) {
-        crate::unknown::with!(self.physics.unknown(), vectors => vectors.velocity.fill(Default::default()));
+        with!(self.physics.unknown(), vectors => vectors.velocity.fill(Default::default()));
     }
 
     /// Puts what is prescribed in motion at time `t` and evaluates the rates there.
@@ -172,6 +172,7 @@ impl Problem {
             }
             Solver::ForwardEuler(method) => {
                 self.damping = 0.0;
+                self.book_what_acts(clock.dt);
                 method.step(self, clock);
                 (self.ledger.kinetic, self.ledger.momentum) = self.physics.motion();
             }
@@ -220,6 +221,12 @@ impl Problem {
     /// The same, booked.
     fn load_and_book(&mut self, t: f64, dt: f64) {
         self.load(t, dt).into_iter().for_each(|booked| self.ledger.book(booked));
+    }
+
+    /// Books what the loads as they are bring in over `dt`, s: all that a step of forward Euler adds.
+    fn book_what_acts(&mut self, dt: f64) {
+        let Problem { physics, terms, ledger, .. } = self;
+        terms.iter().for_each(|term| ledger.book(term.book(dt, &mut physics.unknown())));
     }
 
     /// Replaces points where the solution asks for it; all levels at once when `thoroughly`.
@@ -307,7 +314,9 @@ impl System for Problem {
 
     fn evolve(&mut self, t: f64, dt: f64) {
         self.physics.evolve(dt);
-        self.load_and_book(t, dt);
+        // Of first order the next step is what adds these loads, and books them.
+        let first_order = with!(self.physics.unknown(), vectors => vectors.velocity.is_empty());
+        if first_order { drop(self.load(t, 0.0)) } else { self.load_and_book(t, dt) }
     }
 
     fn drift_and_evolve(&mut self, drift: &Drift, t: f64, dt: f64) -> Option<f64> {

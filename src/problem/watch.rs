@@ -44,6 +44,9 @@ impl Problem {
         }
         if clock.dt > stable {
             format!("the time step {:.3e} s is above the stable step {stable:.3e} s", clock.dt)
+        } else if let Solver::ForwardEuler(_) = solver {
+            "rows of collocation with waves that grow, or sources and prescribed values too large for a number"
+                .to_string()
         } else {
             "bonds turned inside out, by loads or prescribed values too large for this step; try a smaller step"
                 .to_string()

@@ -11,7 +11,7 @@ pub use model::Model;
 
 use crate::error::{Error, Result};
 use crate::output::history::History;
-use crate::output::report::{Energy, Hybrid, Refinement, Report, Tip, WallSeconds, peak_memory};
+use crate::output::report::{Diffusion, Energy, Hybrid, Refinement, Report, Tip, WallSeconds, peak_memory};
 use crate::output::snapshot::FieldCache;
 use crate::output::source::{Points, Source};
 use crate::output::writer::{Output, ScheduledRequest};
@@ -88,7 +88,8 @@ pub struct Progress {
     /// s
     pub time: f64,
     pub imbalance: f64,
-    pub broken_bonds: u64,
+    /// None where nothing can break.
+    pub broken_bonds: Option<u64>,
     pub seconds: f64,
     /// Iterations within a load step, and how far forces are out of balance there.
     pub within: Option<(usize, f64)>,
@@ -210,7 +211,7 @@ impl Simulation {
             n_steps: self.n_steps,
             time: self.clock.time(),
             imbalance: self.history.imbalance(),
-            broken_bonds: self.model.broken_pairs(),
+            broken_bonds: self.model.facts().physics.elastic().map(|_| self.model.broken_pairs()),
             seconds: begin.elapsed().as_secs_f64(),
             within: None,
         }
@@ -222,6 +223,8 @@ impl Simulation {
         let books = self.model.columns(&b).into_iter().map(|column| (column.name, column.value.into())).collect();
         let damage = self.model.field("damage").map_or(Vec::new(), |f| crate::output::source::scalar(f, None));
         let bonds = facts.bonds - facts.cut_bonds;
+        let elastic = facts.physics.elastic();
+        let imbalance = self.history.imbalance();
         Report {
             title: self.title.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -232,10 +235,17 @@ impl Simulation {
             cut_bonds: facts.cut_bonds,
             horizon: facts.horizon,
             spacing: facts.spacing,
-            materials: facts.materials.clone(),
-            micromodulus: facts.micromodulus,
-            critical_stretch: facts.critical_stretch,
-            surface: facts.surface,
+            materials: elastic.map_or(Vec::new(), |e| e.materials.clone()),
+            micromodulus: elastic.map(|e| e.micromodulus),
+            critical_stretch: elastic.and_then(|e| e.critical_stretch),
+            surface: elastic.map(|e| e.surface),
+            diffusion: facts.physics.diffusive().map(|d| Diffusion {
+                diffusivity: d.diffusivity,
+                found_diffusivity: d.found_diffusivity,
+                micro_diffusivity: d.micro_diffusivity,
+                exponent: d.exponent,
+                imbalance,
+            }),
             steps: self.clock.step,
             time_step: self.clock.dt,
             stable_time_step: facts.stable_step * self.solver.stability(),
@@ -244,7 +254,7 @@ impl Simulation {
             wall_seconds: wall,
             bond_updates_per_second: bonds as f64 * self.clock.step as f64 / wall.stepping.max(1e-9),
             peak_memory_bytes: peak_memory(),
-            energy: Energy {
+            energy: elastic.map(|_| Energy {
                 kinetic: b.kinetic,
                 strain: b.strain,
                 fracture: b.fracture,
@@ -252,7 +262,7 @@ impl Simulation {
                 damped: b.damped,
                 refined: b.refined,
                 initial: b.initial,
-            },
+            }),
             hybrid: self.model.hybrid().map(|work| Hybrid {
                 standard_fraction_at_start: work.standard[1],
                 standard_fraction: work.standard[0],
@@ -269,14 +279,14 @@ impl Simulation {
                 points_seen_by_coarser: adapted.seen,
             }),
             books,
-            energy_imbalance: self.history.imbalance(),
-            momentum_error: self.history.momentum_error(),
-            broken_bonds: self.model.broken_pairs(),
-            damaged_points: damage.iter().filter(|&&d| d > 0.35).count(),
+            energy_imbalance: elastic.map(|_| imbalance),
+            momentum_error: elastic.map(|_| self.history.momentum_error()),
+            broken_bonds: elastic.map(|_| self.model.broken_pairs()),
+            damaged_points: elastic.map(|_| damage.iter().filter(|&&d| d > 0.35).count()),
             crack_tip: self.history.tip.as_ref().map(|tip| Tip {
                 position: tip.position.map(|x| x[..facts.dimension].to_vec()),
                 largest_speed: tip.largest_speed,
-                rayleigh_speed: facts.rayleigh_speed,
+                rayleigh_speed: elastic.and_then(|e| e.rayleigh_speed),
             }),
             load_steps: self.model.load_steps().to_vec(),
             state_hash: self.model.hash(),
@@ -339,7 +349,7 @@ mod tests {
     use crate::field::{Field, Values};
     use crate::output::schedule::Schedule;
     use crate::output::snapshot::{FieldRequest, Snapshot};
-    use crate::output::source::BodySummary;
+    use crate::output::source::{BodySummary, ElasticSummary, PhysicsSummary};
     use crate::output::writer::Writer;
     use crate::physics::elasticity::surface::SurfaceEffect;
     use crate::physics::{Balance, Column};
@@ -457,12 +467,14 @@ mod tests {
             horizon: 1.0,
             spacing: 1.0,
             stable_step: 1.0,
-            bar_speed: 1.0,
-            rayleigh_speed: None,
-            materials: Vec::new(),
-            micromodulus: 1.0,
-            critical_stretch: None,
-            surface: SurfaceEffect::default(),
+            physics: PhysicsSummary::Elastic(ElasticSummary {
+                bar_speed: 1.0,
+                rayleigh_speed: None,
+                materials: Vec::new(),
+                micromodulus: 1.0,
+                critical_stretch: None,
+                surface: SurfaceEffect::default(),
+            }),
             memory: 0,
         };
         let points = Arc::new(Points { positions: vec![[0.0; 3]], sizes: Vec::new(), facts });

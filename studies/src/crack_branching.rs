@@ -67,7 +67,7 @@ pub fn run(_full: bool) -> Result<Outcome> {
         Row::new(
             "critical stretch s₀",
             2.714621e-4,
-            facts.critical_stretch.unwrap_or(f64::NAN),
+            facts.physics.elastic().and_then(|e| e.critical_stretch).unwrap_or(f64::NAN),
             1e-6,
             Measure::Relative,
             "s₀² = 4π G₀/(9 E δ), Shojaei et al. 2022, eq. (20); seven digits printed",
@@ -119,7 +119,7 @@ pub fn run(_full: bool) -> Result<Outcome> {
         model.step(&simulation.solver, &mut simulation.clock)?;
     }
 
-    let rayleigh = facts.rayleigh_speed.unwrap_or(f64::NAN);
+    let rayleigh = facts.physics.elastic().and_then(|e| e.rayleigh_speed).unwrap_or(f64::NAN);
     let split = 1e3 * split_column(model, facts.horizon, facts.spacing);
     outcome.rows.extend([
         Row::new("x where the crack has split, mm", 16.5, split, 1.0, Measure::Absolute, format!("{RUN}; one horizon")),

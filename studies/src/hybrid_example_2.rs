@@ -8,7 +8,7 @@
 //! S = 5 cos 5t P − (πκδ²/16) sin 5t (7δ² + 56x² + 48xy + 56y²).
 //! ```
 //!
-//! Forward Euler from C = 0 to t = 1; relative error (66) over the free points. On the second grid every coordinate is
+//! Runs are the bundled case `diffusion_in_a_square` with other keys. Forward Euler from C = 0 to t = 1; relative error (66) over the free points. On the second grid every coordinate is
 //! moved by a random number from 0 to 0.35 h, and cells keep their size.
 //!
 //! The paper's errors and its time step are in a part of the text that was not to be had. κ is 1, or 4/(πδ²) for a
@@ -16,24 +16,20 @@
 
 use std::f64::consts::PI;
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
-
-use super::{Measure, Outcome, Row, Study};
-use bondwise::conditions::Stage;
+use super::{Measure, Outcome, Row, Study, bundled_simulation};
 use bondwise::discretization::collocation::stability::bearable_in_diffusion;
 use bondwise::discretization::quadrature::gauss_legendre;
 use bondwise::discretization::{Collocation, Influence, PartialVolume, standard};
 use bondwise::error::Result;
 use bondwise::execution::Exec;
-use bondwise::family::Body;
 use bondwise::field::Vector;
 use bondwise::geometry::{Cloud, Shape};
 use bondwise::output::plot::{Plot, Series, Style, draw_plot};
+use bondwise::output::source::scalar;
 use bondwise::physics::Diffusion;
 use bondwise::physics::diffusion::Flux;
-use bondwise::solver::{Clock, ForwardEuler, System};
-use bondwise::unknown::{Numbers, Unknown, Vectors};
+use bondwise::simulation::Simulation;
+use bondwise::solver::Clock;
 
 pub const STUDY: Study = Study {
     name: "hybrid-example-2",
@@ -45,8 +41,6 @@ pub const STUDY: Study = Study {
 const SPACING: f64 = 1.0 / 39.0;
 const M: usize = 4;
 const HORIZON: f64 = M as f64 * SPACING;
-/// Free points along a side.
-const FREE: usize = 40;
 /// The largest shift of a coordinate on the second grid, in spacings.
 const SHIFT: f64 = 0.35;
 
@@ -124,131 +118,113 @@ fn bulge([x, y]: Vector<2>, kappa: f64) -> f64 {
     PI * kappa * square / 16.0 * (7.0 * square + 56.0 * x * x + 48.0 * x * y + 56.0 * y * y)
 }
 
-/// Free points and layer, on the lattice or moved off it.
-fn cloud(seed: Option<u64>) -> Cloud<2> {
-    let half = 0.5 + (M as f64 + 0.5) * SPACING;
-    let cloud = Cloud::lattice(&Shape::Box { low: [-half; 2], high: [half; 2] }, SPACING, M + 1);
-    let Some(seed) = seed else { return cloud };
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut shift = || SHIFT * SPACING * (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
-    let moved: Vec<_> = cloud.slots.iter().map(|&slot| cloud.position(slot as usize).map(|x| x + shift())).collect();
-    let volumes = vec![SPACING * SPACING; moved.len()];
-    Cloud { spacing: SPACING, ..Cloud::scattered(moved, volumes) }
-}
-
-/// One scheme on one grid, on its way through time.
+/// One scheme on one grid, on its way through time: the bundled case with other keys.
 struct Square {
-    body: Body<2>,
-    diffusion: Diffusion,
-    exec: Exec,
-    concentration: Vec<f64>,
-    rate: Vec<f64>,
-    free: Vec<u32>,
-    layer: Vec<u32>,
-    /// P and L P by slot.
+    simulation: Simulation,
+    /// Points, and P there.
+    free: Vec<usize>,
     shape: Vec<f64>,
-    bulge: Vec<f64>,
 }
 
 impl Square {
-    /// `bearable`: as of [`Diffusion::collocated`], asked on the lattice only.
-    fn new(scheme: Scheme, kappa: Kappa, seed: Option<u64>, bearable: f64) -> Result<Self> {
-        let (cloud, flux) = (cloud(seed), kappa.flux()?);
-        // Points are numbered row by row, with the layer.
-        let side = FREE + 2 * M;
-        let inside = |i: usize| (M..M + FREE).contains(&i);
-        let (mut free, mut layer) = (Vec::new(), Vec::new());
-        for (point, &slot) in cloud.slots.iter().enumerate() {
-            if inside(point % side) && inside(point / side) { free.push(slot) } else { layer.push(slot) }
-        }
-        let (body, diffusion) = match scheme {
+    /// `gated`: whether rows must be such that a run to t = 1 bears what grows of noise. If not, the case is asked for one step
+    /// only, and marched on.
+    fn new(scheme: Scheme, kappa: Kappa, seed: Option<u64>, gated: bool) -> Result<Self> {
+        let end = if gated { "1" } else { "1e-4" };
+        let mut keys = vec![
+            ("constants.K", kappa.diffusivity().to_string()),
+            // The paper's κ is that of the integral.
+            ("physics.diffusion.calibrated", "false".into()),
+            ("solver.forward_euler.end_time", end.into()),
+        ];
+        keys.extend(match scheme {
             Scheme::Standard(rule) => {
-                let body = standard::body(cloud, HORIZON, rule);
-                let diffusion = Diffusion::standard(&body, &flux, rule);
-                (body, diffusion)
+                let volumes = if rule == PartialVolume::None { "none" } else { "ramp" };
+                vec![("discretization.scheme", "standard".into()), ("discretization.partial_volumes", volumes.into())]
             }
-            Scheme::Collocated { collocation, .. } if seed.is_none() => {
-                Diffusion::collocated(cloud, HORIZON, &flux, &collocation, bearable)?
+            Scheme::Collocated { collocation: Collocation { order, points, exponent }, .. } => {
+                let row = format!("{{ order = {order}, points = {points}, exponent = {exponent:?} }}");
+                vec![("discretization.scheme", format!("{{ collocation = {row} }}"))]
             }
-            Scheme::Collocated { collocation, .. } => {
-                let body = standard::body(cloud, HORIZON, PartialVolume::None);
-                let diffusion = Diffusion::around(&body, &flux, &collocation, &free)?;
-                (body, diffusion)
-            }
-        };
-        let n = body.cloud.n_slots();
-        let (mut at, mut rates) = (vec![0.0; n], vec![0.0; n]);
-        for &slot in &body.cloud.slots {
-            let x = body.cloud.position(slot as usize);
-            at[slot as usize] = shape(x);
-            rates[slot as usize] = bulge(x, flux.micro_diffusivity);
+        });
+        if let Some(seed) = seed {
+            // From 0 to SHIFT is SHIFT/2 to either side, about points that are moved by as much.
+            let half = 0.5 * SHIFT;
+            keys.push(("geometry.perturb", format!("{{ amplitude = {half}, seed = {seed} }}")));
+            keys.push(("constants.shift", (half * SPACING).to_string()));
         }
-        let zeros = vec![0.0; n];
-        let (concentration, rate) = (zeros.clone(), zeros);
-        Ok(Square { body, diffusion, exec: Exec::default(), concentration, rate, free, layer, shape: at, bulge: rates })
+        let keys: Vec<(&str, &str)> = keys.iter().map(|(key, value)| (*key, value.as_str())).collect();
+        let simulation = bundled_simulation("diffusion_in_a_square", &keys)?;
+        let positions = simulation.model.positions();
+        let free = (0..positions.len()).filter(|&point| is_free(positions[point], seed)).collect();
+        let shape = positions.iter().map(|x| shape([x[0], x[1]])).collect();
+        Ok(Square { simulation, free, shape })
     }
 
     /// Error relative to C = `size` P over the free points.
-    fn error(&self, t: f64, size: f64) -> f64 {
+    fn error(&mut self, t: f64, size: f64) -> f64 {
+        let field = self.simulation.model.field("concentration").expect("what diffuses has a concentration");
+        let concentration = scalar(field, None);
         let (mut off, mut all) = (0.0, 0.0);
-        for slot in self.free.iter().map(|&slot| slot as usize) {
-            off += (self.concentration[slot] - (5.0 * t).sin() * self.shape[slot]).powi(2);
-            all += (size * self.shape[slot]).powi(2);
+        for &point in &self.free {
+            off += (concentration[point] - (5.0 * t).sin() * self.shape[point]).powi(2);
+            all += (size * self.shape[point]).powi(2);
         }
         (off / all).sqrt()
     }
 
     /// Marches from C = 0 at t = 0; the relative error (66) at the end, and all along the way that relative to the largest
     /// C, P itself, at `frames` times.
-    fn march(&mut self, dt: f64, end: f64, frames: u32) -> (f64, Vec<(f64, f64)>) {
-        self.concentration.fill(0.0);
-        self.evolve(0.0, 0.0);
+    fn march(mut self, dt: f64, end: f64, frames: u32) -> Result<(f64, Vec<(f64, f64)>)> {
+        self.simulation.model.start();
+        let (solver, mut clock) = (self.simulation.solver, Clock::new(dt));
         let steps = (end / dt).round() as u64;
-        let mut clock = Clock::new(dt);
         let mut course = Vec::new();
         for step in 1..=steps {
-            ForwardEuler.step(self, &mut clock);
+            self.simulation.model.step(&solver, &mut clock)?;
             if step * u64::from(frames) / steps > (step - 1) * u64::from(frames) / steps {
                 course.push((clock.time(), self.error(clock.time(), 1.0)));
             }
         }
         let t = clock.time();
-        (self.error(t, (5.0 * t).sin()), course)
-    }
-
-    /// Largest real part of the eigenvalues of the free points, in K/δ².
-    fn growth(&mut self, kappa: Kappa, steps: u32) -> f64 {
-        let rate = self.diffusion.growth(&self.body, &mut self.exec, &self.free, steps);
-        rate * HORIZON * HORIZON / kappa.diffusivity()
+        Ok((self.error(t, (5.0 * t).sin()), course))
     }
 }
 
-impl System for Square {
-    fn unknown(&mut self) -> Unknown<'_> {
-        let (value, rate) = (&mut self.concentration[..], &mut self.rate[..]);
-        Unknown {
-            vectors: Numbers::Double(Vectors { value, velocity: &mut [], rate, damped: None, relative_inertia: None }),
-            components: 1,
-            inertia: 1.0,
-            negligible: 0.0,
+/// Whether nothing is prescribed at x.
+fn is_free(x: [f64; 3], seed: Option<u64>) -> bool {
+    let shift = if seed.is_some() { 0.5 * SHIFT * SPACING } else { 0.0 };
+    x[..2].iter().all(|x| (x - shift).abs() < 0.5 + 0.5 * SPACING)
+}
+
+/// Largest real part of the eigenvalues of the free points, in K/δ².
+fn growth_in_the_square(collocation: &Collocation, kappa: Kappa, seed: Option<u64>, steps: u32) -> Result<f64> {
+    let flux = kappa.flux()?;
+    let half = 0.5 + (M as f64 + 0.5) * SPACING;
+    let free = |cloud: &Cloud<2>| -> Vec<u32> {
+        let at = |slot: u32| cloud.position(slot as usize);
+        cloud.slots.iter().copied().filter(|&slot| is_free([at(slot)[0], at(slot)[1], 0.0], seed)).collect()
+    };
+    let (body, diffusion, free) = match seed {
+        None => {
+            let cloud = Cloud::lattice(&Shape::Box { low: [-half; 2], high: [half; 2] }, SPACING, M + 1);
+            let free = free(&cloud);
+            let (body, diffusion) = Diffusion::collocated(cloud, HORIZON, &flux, collocation, f64::INFINITY)?;
+            (body, diffusion, free)
         }
-    }
-    fn evolve(&mut self, t: f64, _: f64) {
-        self.diffusion.rate(&self.body, &mut self.exec, &self.concentration, &mut self.rate);
-        let (grows, spreads) = (5.0 * (5.0 * t).cos(), (5.0 * t).sin());
-        for slot in self.free.iter().map(|&slot| slot as usize) {
-            self.rate[slot] += grows * self.shape[slot] - spreads * self.bulge[slot];
+        Some(_) => {
+            // The points of the case.
+            let square = Square::new(RAMP, kappa, seed, true)?;
+            let positions: Vec<_> = square.simulation.model.positions().iter().map(|x| [x[0], x[1]]).collect();
+            let volumes = vec![SPACING * SPACING; positions.len()];
+            let body = standard::body(Cloud::scattered(positions, volumes), HORIZON, PartialVolume::None);
+            let free = free(&body.cloud);
+            let diffusion = Diffusion::around(&body, &flux, collocation, &free)?;
+            (body, diffusion, free)
         }
-    }
-    fn constrain(&mut self, _: Stage, t: f64, dt: f64) {
-        let t = t + dt;
-        for slot in self.layer.iter().map(|&slot| slot as usize) {
-            self.concentration[slot] = (5.0 * t).sin() * self.shape[slot];
-        }
-    }
-    fn stable_step(&self) -> f64 {
-        self.diffusion.stable_step(&self.body)
-    }
+    };
+    let rate = diffusion.growth(&body, &mut Exec::default(), &free, steps);
+    Ok(rate * HORIZON * HORIZON / kappa.diffusivity())
 }
 
 fn study(full: bool) -> Result<Outcome> {
@@ -349,14 +325,13 @@ fn uniform(outcome: &mut Outcome, full: bool) -> Result<()> {
         let mut series = Vec::new();
         for (scheme, expected) in schemes {
             // B is marched where the gate refuses it too: to see what comes of it.
-            let (error, points) = Square::new(scheme, kappa, None, f64::INFINITY)?.march(dt, 1.0, 100);
+            let (error, points) = Square::new(scheme, kappa, None, false)?.march(dt, 1.0, 100)?;
             let what = format!("{}, Δt = {dt:.0e}: error at t = 1, {}", kappa.name(), scheme.name());
             outcome.rows.push(Row::new(what, expected, error, 0.02, Measure::Relative, DIGITS));
             series.push(Series { name: scheme.name().into(), points, style: Style::Line });
         }
         if kappa == Kappa::One {
-            let mut square = Square::new(B_AS_PUBLISHED, kappa, None, f64::INFINITY)?;
-            let (error, points) = square.march(dt, 1.0, 100);
+            let (error, points) = Square::new(B_AS_PUBLISHED, kappa, None, false)?.march(dt, 1.0, 100)?;
             outcome.rows.push(Row::new(
                 format!("{}, Δt = {dt:.0e}: error at t = 1, {}, marched anyway", kappa.name(), B_AS_PUBLISHED.name()),
                 if dt == 1e-3 { 8e3 } else { 1e3 },
@@ -379,8 +354,10 @@ fn uniform(outcome: &mut Outcome, full: bool) -> Result<()> {
 
 /// B is exact in space: its error is proportional to Δt.
 fn time_error(outcome: &mut Outcome) -> Result<()> {
-    let mut square = Square::new(B, Kappa::One, None, bearable_in_diffusion(1.0))?;
-    let errors = [4e-3, 2e-3, 1e-3, 5e-4].map(|dt| square.march(dt, 1.0, 1).0);
+    let mut errors = Vec::new();
+    for dt in [4e-3, 2e-3, 1e-3, 5e-4] {
+        errors.push(Square::new(B, Kappa::One, None, true)?.march(dt, 1.0, 1)?.0);
+    }
     for (k, dt) in [2e-3, 1e-3, 5e-4].into_iter().enumerate() {
         outcome.rows.push(Row::new(
             format!("κ = 1: order in time of B's error, Δt halved to {dt:.0e}"),
@@ -403,18 +380,17 @@ fn growth(outcome: &mut Outcome, full: bool) -> Result<()> {
         let Scheme::Collocated { name, collocation } = scheme else { unreachable!("schemes with rows") };
         let symbol = collocation.on_lattice::<2>(SPACING, HORIZON)?.symbol(&law)?;
         let highest = symbol.highest * HORIZON * HORIZON / kappa.diffusivity();
-        let mut square = Square::new(scheme, kappa, None, f64::INFINITY)?;
         outcome.rows.push(Row::new(
             format!("largest eigenvalue in the square, {name} (K/δ²)"),
             highest,
-            square.growth(kappa, steps),
+            growth_in_the_square(&collocation, kappa, None, steps)?,
             0.0,
             Measure::AtMost,
             "that of the symbol: waves of the square are sums of waves without end; power iteration comes from below",
         ));
     }
     // The error turns upward at t = 0.7, and reaches the size of the solution at 1.7.
-    let (error, points) = Square::new(B, kappa, None, f64::INFINITY)?.march(1e-3, 4.0, 200);
+    let (error, points) = Square::new(B, kappa, None, false)?.march(1e-3, 4.0, 200)?;
     outcome.rows.push(Row::new(
         format!("{}, Δt = 1e-3: error at t = 4, {}, marched anyway", kappa.name(), B.name()),
         1.0,
@@ -439,7 +415,7 @@ fn perturbed(outcome: &mut Outcome, full: bool) -> Result<()> {
     for &(kappa, dt) in columns {
         let mut series = Vec::new();
         for scheme in [RAMP, A, B] {
-            let (error, points) = Square::new(scheme, kappa, Some(seed), f64::INFINITY)?.march(dt, 1.0, 100);
+            let (error, points) = Square::new(scheme, kappa, Some(seed), false)?.march(dt, 1.0, 100)?;
             let column = PRINTED.iter().find(|(k, step, _)| (*k, *step) == (kappa, dt));
             let uniform = column.and_then(|(_, _, schemes)| schemes.iter().find(|(s, _)| *s == scheme));
             let uniform = uniform.map_or(f64::NAN, |(_, error)| *error);
@@ -478,7 +454,8 @@ fn perturbed(outcome: &mut Outcome, full: bool) -> Result<()> {
     let kappa = Kappa::Diffusivity;
     for (scheme, uniform) in [(A, -0.187), (B_AS_PUBLISHED, 32.02), (B, 0.1234)] {
         let steps = if full { 32_000 } else { 2_000 };
-        let found = Square::new(scheme, kappa, Some(seed), f64::INFINITY)?.growth(kappa, steps);
+        let Scheme::Collocated { collocation, .. } = scheme else { unreachable!("schemes with rows") };
+        let found = growth_in_the_square(&collocation, kappa, Some(seed), steps)?;
         let (measure, why) = match scheme {
             A => (Measure::AtMost, "decays, as on the uniform grid; the expected value is 0"),
             _ => (Measure::Information, "that of the uniform grid, for comparison"),

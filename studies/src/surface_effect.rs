@@ -169,7 +169,7 @@ tolerance = 1e-8
         Ok(Pulled {
             elongation: apart(0.5 * spacing) / whole,
             strain: apart(quarter) / (local * (LENGTH - 2.0 * quarter)),
-            effect: model.facts().surface,
+            effect: model.facts().physics.elastic().map_or(SurfaceEffect::default(), |e| e.surface),
         })
     }
 

@@ -351,7 +351,7 @@ fn stretches(simulation: &mut Simulation) -> Vec<f64> {
 #[test]
 fn no_bond_of_a_row_passes_the_critical_stretch_unseen() {
     let mut torn = plate(BRANCHING, "6e6", NOTCH);
-    let critical = torn.model.facts().critical_stretch.unwrap();
+    let critical = torn.model.facts().physics.elastic().and_then(|e| e.critical_stretch).unwrap();
     let (mut most, mut before) = (0.0f64, Vec::new());
     run(&mut torn, |torn| {
         let (scheme, damage, stretch) = (scalars(torn, "scheme"), scalars(torn, "damage"), stretches(torn));

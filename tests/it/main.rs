@@ -3,6 +3,7 @@
 mod architecture;
 mod common;
 mod diffusion;
+mod diffusion_cases;
 mod engine;
 mod hybrid;
 mod materials;

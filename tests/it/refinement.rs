@@ -185,7 +185,7 @@ fn surfaces_of_refined_bodies_are_corrected_and_action_stays_reaction() {
                 }
                 // Rounding of some ten thousand forces.
                 assert!(all > 0.0 && sum.abs() < 1e-12 * all, "{dimension}D {rule} {correction}: {sum:e} of {all:e}");
-                body.model.facts().surface.mean_deficit.abs()
+                body.model.facts().physics.elastic().unwrap().surface.mean_deficit.abs()
             };
             let (without, with) = (lacking("none"), lacking("energy"));
             // One pass leaves a tenth of it on lattices (docs/theory/surface_effect.md).

@@ -62,12 +62,16 @@ impl<const D: usize> Builder<'_, D> {
         slots: Arc<[u32]>,
     ) -> Result<Box<dyn Constraint>> {
         let condition = &self.case.value.conditions[k];
-        let path = format!("conditions[{k}].prescribe.{}.value", motion_name(motion));
+        let path = format!("conditions[{k}].prescribe.{}.value", motion.name());
         let (quantity, component, value) = match motion {
             Motion::Displacement { component, value } => (Quantity::Value, *component, value),
             Motion::Velocity { component, value } => (Quantity::Velocity, *component, value),
+            Motion::Concentration { value } => (Quantity::Value, 0, value),
         };
-        let name = format!("{}_{}", condition.on, ["x", "y", "z"][component]);
+        let name = match motion {
+            Motion::Concentration { .. } => condition.on.clone(),
+            _ => format!("{}_{}", condition.on, ["x", "y", "z"][component]),
+        };
         let profile = self.profile(value, cloud, &slots, &path)?;
         let mut prescribed = Prescribed::new(name, slots, component, quantity, profile);
         prescribed.until = condition.until.unwrap_or(f64::INFINITY);
@@ -85,12 +89,7 @@ impl<const D: usize> Builder<'_, D> {
         terms: &mut Vec<Box<dyn Term>>,
     ) -> Result<()> {
         let until = self.case.value.conditions[k].until.unwrap_or(f64::INFINITY);
-        let kind = match load {
-            model::Load::BodyForce { .. } => "body_force",
-            model::Load::Traction { .. } => "traction",
-            model::Load::Pressure { .. } => "pressure",
-        };
-        let path = format!("conditions[{k}].load.{kind}.value");
+        let path = format!("conditions[{k}].load.{}.value", load.name());
         let mut push = |component, value: &Formula, scale| -> Result<()> {
             let profile = self.profile(value, cloud, slots, &path)?;
             let mut load = Load::new(slots.clone(), component, profile);
@@ -100,6 +99,10 @@ impl<const D: usize> Builder<'_, D> {
         };
         match load {
             model::Load::BodyForce { component, value } => push(*component, value, Scale::Same(1.0)),
+            model::Load::Source { value } => push(0, value, Scale::Same(1.0)),
+            model::Load::Flux { value, thickness } => {
+                push(0, value, Scale::Same(1.0 / thickness.unwrap_or(cloud.spacing)))
+            }
             model::Load::Traction { component, value, thickness } => {
                 push(*component, value, Scale::Same(1.0 / thickness.unwrap_or(cloud.spacing)))
             }
@@ -119,7 +122,7 @@ impl<const D: usize> Builder<'_, D> {
 
     /// `critical`: the critical stretch of a fracture energy, J/m².
     pub(super) fn failure(&self, cloud: &Cloud<D>, critical: &dyn Fn(f64) -> f64) -> Result<Option<CriticalStretch>> {
-        let Some(model::Failure::CriticalStretch(failure)) = &self.case.value.physics.elasticity.failure else {
+        let Some(model::Failure::CriticalStretch(failure)) = &self.case.value.physics.elastic().failure else {
             return Ok(None);
         };
         let stretch = |energy: Option<f64>, stretch: Option<f64>| match energy {
@@ -135,19 +138,12 @@ impl<const D: usize> Builder<'_, D> {
             })
             .collect();
         let path = "physics.elasticity.failure.critical_stretch";
-        let library = self.case.value.physics.elasticity.law.parameters().material;
+        let library = self.case.value.physics.elastic().law.parameters().material;
         let library = library.and_then(|material| material.values().fracture_energy);
         let energy = failure.fracture_energy.or(library.filter(|_| failure.stretch.is_none()));
         CriticalStretch::new(cloud, stretch(energy, failure.stretch), &rules, &failure.no_fail)
             .map(Some)
             .map_err(|e| self.refuse(path, format!("failure rules: {e}"), ""))
-    }
-}
-
-pub(super) fn motion_name(motion: &Motion) -> &'static str {
-    match motion {
-        Motion::Displacement { .. } => "displacement",
-        Motion::Velocity { .. } => "velocity",
     }
 }
 

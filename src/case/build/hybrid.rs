@@ -97,7 +97,7 @@ impl<const D: usize> Builder<'_, D> {
         for (k, name) in settings.standard.iter().enumerate() {
             names.push((name, format!("{PATH}.standard[{k}]")));
         }
-        if let Some(model::Failure::CriticalStretch(failure)) = &case.physics.elasticity.failure {
+        if let Some(model::Failure::CriticalStretch(failure)) = &case.physics.elastic().failure {
             for (k, name) in failure.no_fail.iter().enumerate() {
                 names.push((name, format!("physics.elasticity.failure.critical_stretch.no_fail[{k}]")));
             }

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::execution::Packs;
 use crate::family::Body;
 use crate::geometry::Cloud;
-use crate::output::source::MaterialSummary;
+use crate::output::source::{DiffusiveMaterial, MaterialSummary};
 use crate::physics::elasticity::Elasticity;
 use crate::physics::elasticity::moduli::{self, Hypothesis, Stiffness};
 use crate::physics::failure::CriticalStretch;
@@ -26,6 +26,15 @@ pub(super) struct Values {
     pub young: f64,
     pub density: f64,
     pub poisson: f64,
+}
+
+/// Which points are of which material.
+struct Parts {
+    /// In the order of their numbers.
+    names: Vec<String>,
+    slots: Vec<Arc<[u32]>>,
+    /// By slot.
+    material: Vec<u8>,
 }
 
 /// What a body of several materials is made of, by slot; zero where there is no point.
@@ -60,7 +69,7 @@ fn value(key: &Option<Formula>, material: Option<LibraryMaterial>, of: fn(Librar
 impl<const D: usize> Builder<'_, D> {
     /// The values of the only material, or typical ones of the first of several: what weights are made for.
     pub(super) fn reference(&self, cloud: &Cloud<D>) -> Result<Values> {
-        let elasticity = &self.case.value.physics.elasticity;
+        let elasticity = self.case.value.physics.elastic();
         let law = elasticity.law.parameters();
         let library = law.material.map(LibraryMaterial::values);
         let Some(name) = elasticity.materials.keys().next() else {
@@ -89,37 +98,28 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     fn poisson(&self, material: &Material) -> f64 {
-        let law = self.case.value.physics.elasticity.law.parameters().poisson;
+        let law = self.case.value.physics.elastic().law.parameters().poisson;
         let library = material.material.map(|material| material.values().poisson);
         material.poisson.or(law).or(library).unwrap_or(0.0)
     }
 
-    /// What a body of several materials is made of; None where the law says it all. Materials become sets of the cloud.
-    pub(super) fn composition(&self, cloud: &mut Cloud<D>, critical: Critical<'_>) -> Result<Option<Composition>> {
-        const PATH: &str = "physics.elasticity.materials";
-        let where_ = &self.case.value.physics.elasticity.materials;
+    /// Which points are of which material; None where the physics says it all. Materials become sets of the cloud.
+    fn parts(&self, cloud: &mut Cloud<D>) -> Result<Option<Parts>> {
+        let (path, where_) = self.case.value.physics.materials();
         if where_.is_empty() {
             return Ok(None);
         }
-        let n = cloud.n_slots();
-        let mut found = Composition {
-            names: where_.keys().cloned().collect(),
-            typical: Vec::new(),
-            slots: Vec::new(),
-            material: vec![u8::MAX; n],
-            young: vec![0.0; n],
-            density: vec![0.0; n],
-            stretch: vec![f64::INFINITY; n],
-        };
+        let names: Vec<String> = where_.keys().cloned().collect();
+        let mut found = Parts { names, slots: Vec::new(), material: vec![u8::MAX; cloud.n_slots()] };
         for (k, (name, set)) in where_.iter().enumerate() {
-            let slots = self.slots(set, cloud, &format!("{PATH}.{name}"))?;
+            let slots = self.slots(set, cloud, &format!("{path}.{name}"))?;
             for &slot in slots.iter() {
                 let of = &mut found.material[slot as usize];
                 if *of != u8::MAX {
                     let (other, point) = (&found.names[*of as usize], self.place(cloud, slot));
                     let message = format!("{point} is of `{other}` (set `{}`) as well", where_[other]);
                     let help = "every point is of one material: take it out of one of the sets, as with `not`";
-                    return Err(self.refuse(&format!("{PATH}.{name}"), message, help));
+                    return Err(self.refuse(&format!("{path}.{name}"), message, help));
                 }
                 *of = k as u8;
             }
@@ -128,15 +128,83 @@ impl<const D: usize> Builder<'_, D> {
         if let Some(&slot) = cloud.slots.iter().find(|&&slot| found.material[slot as usize] == u8::MAX) {
             let message = format!("{} is of no material", self.place(cloud, slot));
             let help = "every point is of one: a set such as `{ not = … }` takes the rest";
-            return Err(self.refuse(PATH, message, help));
+            return Err(self.refuse(path, message, help));
         }
-        for (k, name) in found.names.clone().iter().enumerate() {
-            self.fill(&mut found, k, &self.case.value.materials[name], cloud, critical)?;
+        for (name, slots) in found.names.iter().zip(&found.slots) {
             if cloud.sets.get(name).is_none() {
-                cloud.sets.insert(name.clone(), found.slots[k].to_vec());
+                cloud.sets.insert(name.clone(), slots.to_vec());
             }
         }
         Ok(Some(found))
+    }
+
+    /// What an elastic body of several materials is made of; None where the law says it all.
+    pub(super) fn composition(&self, cloud: &mut Cloud<D>, critical: Critical<'_>) -> Result<Option<Composition>> {
+        let Some(Parts { names, slots, material }) = self.parts(cloud)? else { return Ok(None) };
+        let n = cloud.n_slots();
+        let mut found = Composition {
+            names,
+            typical: Vec::new(),
+            slots,
+            material,
+            young: vec![0.0; n],
+            density: vec![0.0; n],
+            stretch: vec![f64::INFINITY; n],
+        };
+        for (k, name) in found.names.clone().iter().enumerate() {
+            self.fill(&mut found, k, &self.case.value.materials[name], cloud, critical)?;
+        }
+        Ok(Some(found))
+    }
+
+    /// K by slot of a body of several materials, zero where there is no point, and what is known of each; None where
+    /// the physics says it all.
+    pub(super) fn diffusivities(&self, cloud: &mut Cloud<D>) -> Result<Option<(Vec<f64>, Vec<DiffusiveMaterial>)>> {
+        let Some(parts) = self.parts(cloud)? else { return Ok(None) };
+        let (mut found, mut list) = (vec![0.0; cloud.n_slots()], Vec::new());
+        for (name, slots) in parts.names.into_iter().zip(parts.slots) {
+            let material = &self.case.value.materials[&name];
+            let deviation = material.random.as_ref().map_or(0.0, |random| random.diffusivity);
+            let path = format!("materials.{name}");
+            let values =
+                self.values(&material.diffusivity, "diffusivity", deviation, (material, cloud, &slots, &path))?;
+            // `check` has seen to it that it is given.
+            let values = values.ok_or_else(|| Error::Refused(format!("{path} lacks `diffusivity`")))?;
+            slots.iter().zip(&values).for_each(|(&slot, value)| found[slot as usize] = *value);
+            list.push(DiffusiveMaterial {
+                name,
+                points: slots.len(),
+                volume: slots.iter().map(|&slot| cloud.volume(slot as usize)).sum(),
+                diffusivity: values.iter().copied().fold(0.0, f64::max),
+            });
+        }
+        Ok(Some((found, list)))
+    }
+
+    /// A value of a material at its points, if it is given: positive at each.
+    #[allow(clippy::type_complexity)] // what, and where
+    fn values(
+        &self,
+        formula: &Option<Formula>,
+        key: &str,
+        deviation: f64,
+        (material, cloud, slots, path): (&Material, &Cloud<D>, &Arc<[u32]>, &str),
+    ) -> Result<Option<Vec<f64>>> {
+        let Some(formula) = formula else { return Ok(None) };
+        let random = material.random.as_ref().filter(|_| deviation > 0.0);
+        let mut values = self.profile(formula, cloud, slots, &format!("{path}.{key}"))?.at(0.0).to_vec();
+        if let Some(random) = random {
+            self.scatter(&mut values, random, deviation, cloud, slots, path)?;
+        }
+        if let Some(bad) = values.iter().position(|value| *value <= 0.0) {
+            let message = format!("`{key}` is {:e} at {}", values[bad], self.place(cloud, slots[bad]));
+            let help = match random {
+                Some(_) => "take `distribution = \"log_normal\"`, which stays positive, or a smaller deviation",
+                None => "it must be above 0 at every point of the material",
+            };
+            return Err(self.refuse(&format!("{path}.{key}"), message, help));
+        }
+        Ok(Some(values))
     }
 
     /// The values of material number `k` at its points.
@@ -151,21 +219,8 @@ impl<const D: usize> Builder<'_, D> {
         let (slots, path) = (found.slots[k].clone(), format!("materials.{}", found.names[k]));
         let library = material.material;
         let random = material.random.as_ref();
-        let at = |formula: &Option<Formula>, key: &str, deviation: f64| -> Result<Option<Vec<f64>>> {
-            let Some(formula) = formula else { return Ok(None) };
-            let mut values = self.profile(formula, cloud, &slots, &format!("{path}.{key}"))?.at(0.0).to_vec();
-            if let Some(random) = random.filter(|_| deviation > 0.0) {
-                self.scatter(&mut values, random, deviation, cloud, &slots, &path)?;
-            }
-            if let Some(bad) = values.iter().position(|value| *value <= 0.0) {
-                let message = format!("`{key}` is {:e} at {}", values[bad], self.place(cloud, slots[bad]));
-                let help = match random.filter(|_| deviation > 0.0) {
-                    Some(_) => "take `distribution = \"log_normal\"`, which stays positive, or a smaller deviation",
-                    None => "it must be above 0 at every point of the material",
-                };
-                return Err(self.refuse(&format!("{path}.{key}"), message, help));
-            }
-            Ok(Some(values))
+        let at = |formula: &Option<Formula>, key: &str, deviation: f64| {
+            self.values(formula, key, deviation, (material, cloud, &slots, &path))
         };
         let scatter = |of: fn(&Random) -> f64| random.map_or(0.0, of);
         let young = value(&material.young, library, |m| m.values().young);
@@ -176,7 +231,7 @@ impl<const D: usize> Builder<'_, D> {
         let (Some(young), Some(density)) = (young, density) else {
             return Err(Error::Refused(format!("{path} lacks `young` or `density`")));
         };
-        let failure = self.case.value.physics.elasticity.failure.as_ref();
+        let failure = self.case.value.physics.elastic().failure.as_ref();
         let failure = failure.map(|model::Failure::CriticalStretch(failure)| failure);
         let own = material.fracture_energy.is_some() || material.critical_stretch.is_some();
         let energy = if own {
@@ -254,7 +309,7 @@ impl<const D: usize> Builder<'_, D> {
         let mut table = PairTable { materials: composition.material.clone(), factors: vec![1.0; n * n], n };
         // Slots without a point are of no material; their bonds do not exist.
         table.materials.iter_mut().for_each(|material| *material = (*material).min(n as u8 - 1));
-        for interface in &self.case.value.physics.elasticity.interfaces {
+        for interface in &self.case.value.physics.elastic().interfaces {
             let [a, b] = self.pair(composition, &interface.between);
             if let Some(young) = interface.young {
                 let factor = young / harmonic_mean(composition, a, b);
@@ -346,7 +401,7 @@ impl<const D: usize> Builder<'_, D> {
         composition: &Composition,
         critical: Critical<'_>,
     ) -> Result<Option<CriticalStretch>> {
-        let elasticity = &self.case.value.physics.elasticity;
+        let elasticity = self.case.value.physics.elastic();
         let Some(model::Failure::CriticalStretch(failure)) = &elasticity.failure else { return Ok(None) };
         let mut rules = Vec::new();
         for interface in &elasticity.interfaces {

@@ -23,15 +23,16 @@ impl<const D: usize> Builder<'_, D> {
         match &self.case.value.geometry.cracks[..] {
             [model::Crack::Segment { from, to }] => {
                 let along = [to[0] - from[0], to[1] - from[1], 0.0];
-                Some(CrackTip::new(along, DAMAGED, tip_window(facts)))
+                tip_window(facts).map(|window| CrackTip::new(along, DAMAGED, window))
             }
             _ => None,
         }
     }
 }
 
-pub(super) fn tip_window(facts: &BodySummary) -> f64 {
-    20.0 * facts.horizon / facts.bar_speed
+/// s; None where nothing breaks.
+pub(super) fn tip_window(facts: &BodySummary) -> Option<f64> {
+    facts.physics.elastic().map(|elastic| 20.0 * facts.horizon / elastic.bar_speed)
 }
 
 pub(super) fn schedule(every: Option<f64>, every_steps: Option<u64>, at: &[f64]) -> Schedule {

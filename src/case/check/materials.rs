@@ -2,31 +2,24 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::model::{Case, Plane, Scheme};
+use super::super::model::{Case, Elasticity, Plane, Scheme};
 use super::Checker;
 use crate::expression::nearest;
 
 /// Everything that is wrong with the materials of a case by its text alone; whether every point has one is seen by the points.
 pub(super) fn check<'a>(checker: &mut Checker<'_>, case: &'a Case, used: &mut BTreeSet<&'a str>) {
-    let elasticity = &case.physics.elasticity;
-    let (dimension, law) = (case.case.dimension, elasticity.law.of());
     let imported = case.geometry.points.is_some();
-    let names = || case.materials.keys().map(String::as_str);
-    let unknown = |name: &str| {
-        let help = nearest(name, names()).map_or(String::new(), |n| format!("did you mean `{n}`?"));
-        (format!("no material has this name; materials: {}", names().collect::<Vec<_>>().join(", ")), help)
-    };
-    for (name, set) in &elasticity.materials {
-        let path = format!("physics.elasticity.materials.{name}");
+    let (key, materials) = case.physics.materials();
+    for (name, set) in materials {
+        let path = format!("{key}.{name}");
         if !case.materials.contains_key(name) {
-            let (message, help) = unknown(name);
-            checker.error(&path, message, &help);
+            unknown(checker, case, name, &path);
         }
         if name == "all" || case.sets.contains_key(name) && set != name {
             let message = "a material is a set of this name, and there is one of other points";
             checker.error(&path, message, "rename one of them, or let the material be that set");
         }
-        if elasticity.materials.contains_key(set) && set != name {
+        if materials.contains_key(set) && set != name {
             let message = format!("`{set}` is a material, and a point is of one material only");
             checker.error(&path, message, "name a set");
         } else if set == name && !case.sets.contains_key(set) && !imported {
@@ -35,16 +28,41 @@ pub(super) fn check<'a>(checker: &mut Checker<'_>, case: &'a Case, used: &mut BT
             checker.set_name(set, case, imported, &path, used);
         }
     }
-    if elasticity.materials.len() > 200 {
-        checker.error("physics.elasticity.materials", "a body has at most 200 materials", "");
+    if materials.len() > 200 {
+        checker.error(key, "a body has at most 200 materials", "");
     }
+    for name in case.materials.keys().filter(|name| !materials.contains_key(*name)) {
+        let message = format!("this material is defined but is nowhere: `{key}` does not name it");
+        checker.warning(&format!("materials.{name}"), message);
+    }
+    if let Some(elasticity) = &case.physics.elasticity {
+        elastic(checker, case, elasticity);
+        interfaces(checker, case, elasticity);
+    }
+    if case.physics.diffusion.is_some() {
+        for (name, material) in case.materials.iter().filter(|(name, _)| materials.contains_key(*name)) {
+            if material.diffusivity.is_none() {
+                let help = "add `diffusivity = <number or formula, m^2/s>`";
+                checker.error(&format!("materials.{name}"), "missing key `diffusivity`: how fast it spreads", help);
+            }
+        }
+    }
+}
+
+/// A name that no material has.
+fn unknown(checker: &mut Checker<'_>, case: &Case, name: &str, path: &str) {
+    let names = || case.materials.keys().map(String::as_str);
+    let help = nearest(name, names()).map_or(String::new(), |n| format!("did you mean `{n}`?"));
+    let message = format!("no material has this name; materials: {}", names().collect::<Vec<_>>().join(", "));
+    checker.error(path, message, &help);
+}
+
+/// The values of the materials of an elastic body.
+fn elastic(checker: &mut Checker<'_>, case: &Case, elasticity: &Elasticity) {
+    let (dimension, law) = (case.case.dimension, elasticity.law.of());
     for (name, material) in &case.materials {
         let path = format!("materials.{name}");
         if !elasticity.materials.contains_key(name) {
-            checker.warning(
-                &path,
-                "this material is defined but is nowhere: `physics.elasticity.materials` does not name it",
-            );
             continue;
         }
         for (key, unit, given) in
@@ -87,13 +105,22 @@ pub(super) fn check<'a>(checker: &mut Checker<'_>, case: &'a Case, used: &mut BT
             }
         }
     }
+    let several = elasticity.materials.len() > 1;
+    if several && law.is_state_based() && matches!(case.discretization.scheme, Scheme::Hybrid(_)) {
+        let message = "rows of the state-based law are of one material: its dilatation is carried from row to row";
+        checker.error("discretization.scheme.hybrid", message, "use a bond-based law, or `scheme = \"standard\"`");
+    }
+}
+
+/// What lies between two of them.
+fn interfaces(checker: &mut Checker<'_>, case: &Case, elasticity: &Elasticity) {
+    let law = elasticity.law.of();
     let mut pairs: BTreeMap<[&str; 2], usize> = BTreeMap::new();
     for (k, interface) in elasticity.interfaces.iter().enumerate() {
         let path = format!("physics.elasticity.interfaces[{k}]");
         for (i, name) in interface.between.iter().enumerate() {
             if !elasticity.materials.contains_key(name) {
-                let (message, help) = unknown(name);
-                checker.error(&format!("{path}.between[{i}]"), message, &help);
+                unknown(checker, case, name, &format!("{path}.between[{i}]"));
             }
         }
         let [Some(a), Some(b)] = [interface.between.first(), interface.between.get(1)] else { continue };
@@ -126,10 +153,5 @@ pub(super) fn check<'a>(checker: &mut Checker<'_>, case: &'a Case, used: &mut BT
         if !energy && !stretch && interface.young.is_none() {
             checker.error(&path, "this interface says nothing", "add `fracture_energy`, `stretch` or `young`");
         }
-    }
-    let several = elasticity.materials.len() > 1;
-    if several && law.is_state_based() && matches!(case.discretization.scheme, Scheme::Hybrid(_)) {
-        let message = "rows of the state-based law are of one material: its dilatation is carried from row to row";
-        checker.error("discretization.scheme.hybrid", message, "use a bond-based law, or `scheme = \"standard\"`");
     }
 }

@@ -3,10 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::discretization::Influence;
 use crate::discretization::influence::each_influence;
+use crate::discretization::{Influence, PartialVolume};
 
-use super::{Formula, Region};
+use super::{Collocation, Formula, Region};
 
 /// How the integral over the family becomes a sum.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -160,6 +160,16 @@ pub enum PartialVolumes {
     Exact,
 }
 
+impl From<PartialVolumes> for PartialVolume {
+    fn from(rule: PartialVolumes) -> Self {
+        match rule {
+            PartialVolumes::None => PartialVolume::None,
+            PartialVolumes::Ramp => PartialVolume::Ramp,
+            PartialVolumes::Exact => PartialVolume::Exact,
+        }
+    }
+}
+
 /// Surface corrections: factors of bonds that have an end near a surface.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -193,8 +203,10 @@ pub enum Scheme {
     /// One-point quadrature over bonds.
     #[default]
     Standard,
-    /// Collocation where matter is whole, the standard scheme where it breaks and near boundaries. Lattices only.
+    /// Elasticity: collocation where matter is whole, the standard scheme where it breaks and near boundaries. Lattices only.
     Hybrid(Hybrid),
+    /// Diffusion: collocation everywhere. Values are prescribed wherever the ball of the horizon is not whole.
+    Collocation(Collocation),
 }
 
 /// Parameters of the hybrid scheme.

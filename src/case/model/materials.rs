@@ -28,6 +28,9 @@ pub struct Material {
     /// s₀ inside. Either this or `fracture_energy`.
     #[schemars(extend("x-unit" = "", "x-expression" = ["x", "y", "z"], "exclusiveMinimum" = 0))]
     pub critical_stretch: Option<Formula>,
+    /// K, of what diffuses.
+    #[schemars(extend("x-unit" = "m^2/s", "x-expression" = ["x", "y", "z"], "exclusiveMinimum" = 0))]
+    pub diffusivity: Option<Formula>,
     /// Scatter of these values from point to point.
     pub random: Option<Random>,
 }
@@ -60,6 +63,10 @@ pub struct Random {
     #[serde(default)]
     #[schemars(extend("x-unit" = "", "minimum" = 0))]
     pub critical_stretch: f64,
+    /// The same of the diffusivity.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "", "minimum" = 0))]
+    pub diffusivity: f64,
 }
 
 /// How values scatter about their mean.

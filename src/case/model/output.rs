@@ -17,7 +17,7 @@ pub enum Output {
     Vtu(Vtu),
     /// PNG pictures of a field.
     Picture(Picture),
-    /// Rows of the table of energies, momenta and reactions; every 20 steps if not given.
+    /// Rows of the table of energies and momenta, or amounts, and of reactions; every 20 steps if not given.
     History(History),
     /// The fields at the point nearest to a place, as a table.
     Probe(Probe),
@@ -34,7 +34,7 @@ pub struct Vtu {
     pub every: Option<f64>,
     #[schemars(range(min = 1))]
     pub every_steps: Option<u64>,
-    /// Fields; displacement and damage if not given.
+    /// Fields; displacement and damage if not given, of diffusion the concentration.
     #[serde(default)]
     pub fields: Vec<FieldName>,
 }
@@ -130,7 +130,7 @@ pub struct Probe {
     /// A place; the nearest point is probed.
     #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
     pub at: Vec<f64>,
-    /// Fields; displacement and velocity if not given.
+    /// Fields; displacement and velocity if not given, of diffusion the concentration.
     #[serde(default)]
     pub fields: Vec<FieldName>,
     #[schemars(range(min = 1))]

@@ -5,15 +5,38 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Interface;
+use super::{Diffusion, Interface};
 use crate::case::library::LibraryMaterial;
 use crate::physics::elasticity::laws;
 
-/// What the body is made of.
+/// What happens in the body: exactly one of these.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Physics {
-    pub elasticity: Elasticity,
+    pub elasticity: Option<Elasticity>,
+    pub diffusion: Option<Diffusion>,
+}
+
+impl Physics {
+    /// That of a case in which nothing diffuses.
+    ///
+    /// # Panics
+    /// Of a case without elasticity, which the rules across keys refuse.
+    pub fn elastic(&self) -> &Elasticity {
+        self.elasticity.as_ref().expect("a checked case without diffusion has elasticity")
+    }
+}
+
+impl Physics {
+    /// Where each material is, and the key that says so.
+    pub fn materials(&self) -> (&'static str, &BTreeMap<String, String>) {
+        static NONE: BTreeMap<String, String> = BTreeMap::new();
+        match (&self.elasticity, &self.diffusion) {
+            (Some(elasticity), _) => ("physics.elasticity.materials", &elasticity.materials),
+            (None, Some(diffusion)) => ("physics.diffusion.materials", &diffusion.materials),
+            (None, None) => ("physics", &NONE),
+        }
+    }
 }
 
 /// An elastic solid that may break.

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::FirstOrder;
+
 /// One solver, or several that follow each other.
 ///
 /// A list is `[{ static = { ... } }, { velocity_verlet = { ... } }]`, or several `[[solver]]` tables. Each begins with the
@@ -39,6 +41,7 @@ impl Solver {
             Solver::Newton(_) => "newton",
             Solver::DynamicRelaxation(_) => "dynamic_relaxation",
             Solver::QuasiStatic(_) => "quasi_static",
+            Solver::ForwardEuler(_) => "forward_euler",
         }
     }
 
@@ -48,7 +51,13 @@ impl Solver {
             Solver::VelocityVerlet(s) | Solver::RungeKutta(s) => s.end_time,
             Solver::Static(s) | Solver::Newton(s) | Solver::QuasiStatic(s) => s.end_time,
             Solver::DynamicRelaxation(s) => s.end_time,
+            Solver::ForwardEuler(s) => s.end_time,
         }
+    }
+
+    /// Whether it advances equations of first order, as those of diffusion; all others are of motion or rest.
+    pub fn is_of_first_order(&self) -> bool {
+        matches!(self, Solver::ForwardEuler(_))
     }
 }
 
@@ -70,6 +79,8 @@ pub enum Solver {
     /// Newton's method, and overstrained bonds break, the worst first, until none is left; load steps are cut where no
     /// equilibrium is found.
     QuasiStatic(Statics),
+    /// Of diffusion: explicit, first order; one sum over bonds a step.
+    ForwardEuler(FirstOrder),
 }
 
 /// Parameters of static solvers.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::discretization::collocation::stability::Law;
 use crate::discretization::moments::ball_moment;
 use crate::discretization::volume::RIM_TOLERANCE;
-use crate::discretization::{BondWeights, Collocation, Influence, Operator, PartialVolume};
+use crate::discretization::{BondWeights, Collocation, Heterogeneity, Influence, Operator, PartialVolume};
 use crate::error::{Error, Result};
 use crate::execution::{Exec, PointRows};
 use crate::family::{Body, Bond, BondKernel, BondStates, Families};
@@ -65,7 +65,7 @@ impl Flux {
     }
 }
 
-pub use physics::Diffusing;
+pub use physics::{Diffusing, fields};
 
 /// L C on one body.
 #[derive(Debug, Clone)]
@@ -77,7 +77,6 @@ enum Scheme {
     Sum {
         weights: BondWeights,
         q: u32,
-        bonds: BondStates,
     },
     Rows(PointRows),
 }
@@ -87,7 +86,7 @@ impl Diffusion {
     /// [`standard::body`](crate::discretization::standard::body) with the same rule.
     pub fn standard<const D: usize>(body: &Body<D>, flux: &Flux, rule: PartialVolume) -> Self {
         let operator = Operator::standard(body, flux.micro_diffusivity, flux.influence, rule);
-        Diffusion(Scheme::Sum { weights: operator.weights, q: flux.q, bonds: BondStates::whole(body) })
+        Diffusion(Scheme::Sum { weights: operator.weights, q: flux.q })
     }
 
     /// Collocation on a lattice, and the body whose families are its supports. Right where the whole ball lies in the cloud.
@@ -116,8 +115,7 @@ impl Diffusion {
         if let Families::Lattice(families) = &body.families {
             weights.by_offset = families.offsets.iter().map(|offset| row[&offset.step]).collect();
         }
-        let bonds = BondStates::whole(&body);
-        Ok((body, Diffusion(Scheme::Sum { weights, q: 0, bonds })))
+        Ok((body, Diffusion(Scheme::Sum { weights, q: 0 })))
     }
 
     /// Collocation about points of any cloud: a row of its own for each of `slots`, and none elsewhere. `body` holds all
@@ -151,10 +149,17 @@ impl Diffusion {
         Ok(Diffusion(Scheme::Rows(PointRows::new(&rows))))
     }
 
-    /// L C at every point, unit of C per second.
-    pub fn rate<const D: usize>(&self, body: &Body<D>, exec: &mut Exec, concentration: &[f64], rate: &mut [f64]) {
+    /// L C at every point, unit of C per second. Bonds that do not hold carry nothing; rows of their own know no bonds.
+    pub fn rate<const D: usize>(
+        &self,
+        body: &Body<D>,
+        bonds: &BondStates,
+        exec: &mut Exec,
+        concentration: &[f64],
+        rate: &mut [f64],
+    ) {
         match &self.0 {
-            Scheme::Sum { weights, q, bonds } => {
+            Scheme::Sum { weights, q } => {
                 exec.sum_bonds::<D, 1, 1, Double>(body, weights, bonds, [concentration], [rate], &Conduction(*q));
             }
             Scheme::Rows(rows) => rows.sum(concentration, rate),
@@ -163,28 +168,45 @@ impl Diffusion {
 
     /// A step of forward Euler that is stable if any is, s: Δt = 1/max Σ |w|, of the standard scheme w = κ ω β V′/|ξ|^q.
     ///
-    /// By Gershgorin's bound on the spectral radius, 2 Σ |w|. The standard scheme has w > 0 and no eigenvalue above 0.
+    /// By Gershgorin's bound on the spectral radius, 2 Σ |w|. The standard scheme has w > 0 and no eigenvalue above 0. With all
+    /// bonds whole: without some of them the bound is lower.
     pub fn stable_step<const D: usize>(&self, body: &Body<D>) -> f64 {
         let largest = match (&self.0, &body.families) {
             (Scheme::Rows(rows), _) => rows.largest(),
-            (Scheme::Sum { weights, q, .. }, Families::Lattice(families)) => {
+            (Scheme::Sum { weights, q }, Families::Lattice(families)) if weights.heterogeneity.is_none() => {
                 let sizes = families.offsets.iter().zip(&weights.by_offset);
                 sizes.map(|(offset, w)| w.abs() / offset.length.powi(*q as i32)).sum()
             }
-            (Scheme::Sum { weights, q, bonds }, _) => {
+            (Scheme::Sum { weights, q }, _) => {
                 let mut sums = vec![0.0; body.cloud.n_slots()];
-                Exec::default().sum_bonds::<D, 0, 1, Double>(body, weights, bonds, [], [&mut sums], &Conductance(*q));
+                let whole = BondStates::whole(body);
+                Exec::default().sum_bonds::<D, 0, 1, Double>(body, weights, &whole, [], [&mut sums], &Conductance(*q));
                 sums.into_iter().fold(0.0, f64::max)
             }
         };
         1.0 / largest
     }
 
+    /// From here on the diffusivity of each bond is that of the weights times what this says. Of the standard scheme.
+    pub fn vary(&mut self, heterogeneity: Heterogeneity) {
+        if let Scheme::Sum { weights, .. } = &mut self.0 {
+            weights.heterogeneity = Some(heterogeneity.into());
+        }
+    }
+
+    /// Bytes of weights by offset and of rows; those of bonds that differ in length follow from it.
+    pub fn memory(&self) -> usize {
+        match &self.0 {
+            Scheme::Sum { weights, .. } => size_of_val(&weights.by_offset[..]),
+            Scheme::Rows(rows) => rows.memory(),
+        }
+    }
+
     /// ½ Σ w ξ₁², m²/s: the diffusivity that long waves find on a lattice. None elsewhere.
     ///
     /// Of the standard scheme it is not K: 1 − 1/(2m) of it in 1D with q = 2 and partial volumes, however fine the lattice.
     pub fn diffusivity<const D: usize>(&self, body: &Body<D>) -> Option<f64> {
-        let (Scheme::Sum { weights, q, .. }, Families::Lattice(families)) = (&self.0, &body.families) else {
+        let (Scheme::Sum { weights, q }, Families::Lattice(families)) = (&self.0, &body.families) else {
             return None;
         };
         let terms = families.offsets.iter().zip(&weights.by_offset);
@@ -213,12 +235,13 @@ impl Diffusion {
         let dt = 0.5 * self.stable_step(body);
         let mut field = vec![0.0; body.cloud.n_slots()];
         let mut rate = field.clone();
+        let whole = BondStates::whole(body);
         for (k, &slot) in free.iter().enumerate() {
             field[slot as usize] = ((k * 7919) % 1013) as f64 / 1013.0 - 0.5;
         }
         let (mut logarithm, mut half) = (0.0, 0.0);
         for step in 1..=steps {
-            self.rate(body, exec, &field, &mut rate);
+            self.rate(body, &whole, exec, &field, &mut rate);
             let mut square = 0.0;
             for &slot in free {
                 let value = &mut field[slot as usize];

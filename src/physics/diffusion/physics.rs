@@ -7,8 +7,9 @@ use std::ops::Range;
 
 use super::Diffusion;
 use crate::execution::Exec;
-use crate::family::{Body, BondStates};
+use crate::family::{Body, BondStates, Families};
 use crate::field::{Field, Values};
+use crate::geometry::{Arrangement, Crack};
 use crate::parallel;
 use crate::physics::{Balance, Column, Content, FieldInfo, Physics, Points};
 use crate::unknown::{Numbers, Unknown, Vectors};
@@ -22,7 +23,11 @@ pub struct Diffusing<const D: usize> {
     pub concentration: Vec<f64>,
     /// Ċ, per second.
     rate: Vec<f64>,
+    /// Which bonds carry something: all but those that pre-cracks cut.
     bonds: BondStates,
+    /// Directed bonds before any was cut, and how many were.
+    n_bonds: u64,
+    n_cut: u64,
     exec: Exec,
 }
 
@@ -31,9 +36,23 @@ impl<const D: usize> Diffusing<D> {
     pub fn new(body: Body<D>, diffusion: Diffusion) -> Self {
         let n = body.cloud.n_slots();
         let bonds = BondStates::whole(&body);
+        let n_bonds = bonds.count();
         let (concentration, rate) = (vec![0.0; n], vec![0.0; n]);
-        Diffusing { body, diffusion, concentration, rate, bonds, exec: Exec::default() }
+        Diffusing { body, diffusion, concentration, rate, bonds, n_bonds, n_cut: 0, exec: Exec::default() }
     }
+
+    /// Makes a pre-crack an insulator: the bonds that it cuts carry nothing. How many they are, both directions counted;
+    /// `tolerance` in m, what counts as touching. Of the standard scheme: rows of collocation are right for whole balls only.
+    pub fn cut(&mut self, crack: &Crack<D>, tolerance: f64) -> u64 {
+        let cut = self.bonds.cut(&self.body, crack, tolerance);
+        self.n_cut += cut;
+        cut
+    }
+}
+
+/// The fields of bodies in which something diffuses.
+pub fn fields() -> impl Iterator<Item = &'static FieldInfo> {
+    Diffusing::<2>::FIELDS.iter().map(|(info, _)| info)
 }
 
 type FieldOf<const D: usize> = fn(&Diffusing<D>, usize) -> f64;
@@ -59,8 +78,8 @@ impl<const D: usize> Physics for Diffusing<D> {
     }
 
     fn evaluate(&mut self) {
-        let Diffusing { body, diffusion, concentration, rate, exec, .. } = self;
-        diffusion.rate(body, exec, concentration, rate);
+        let Diffusing { body, diffusion, concentration, rate, bonds, exec, .. } = self;
+        diffusion.rate(body, bonds, exec, concentration, rate);
     }
 
     fn evolve(&mut self, _: f64) {
@@ -87,7 +106,7 @@ impl<const D: usize> Physics for Diffusing<D> {
     }
 
     fn n_bonds(&self) -> [u64; 2] {
-        [self.bonds.count(), 0]
+        [self.n_bonds, self.n_cut]
     }
 
     /// No motion; the amount stands in the first component.
@@ -127,15 +146,30 @@ impl<const D: usize> Physics for Diffusing<D> {
     fn visit(&mut self, visitor: &mut dyn Visitor) {
         visitor.doubles("concentration", &mut self.concentration);
         visitor.doubles("rate", &mut self.rate);
+        visitor.words("bonds", self.bonds.vector());
     }
 
     fn hash(&mut self, hasher: &mut blake3::Hasher) {
         for &slot in &self.body.cloud.slots {
             hasher.update(&self.concentration[slot as usize].to_le_bytes());
         }
+        hasher.update(&self.bonds.bytes());
     }
 
     fn memory(&self) -> usize {
-        2 * size_of_val(&self.concentration[..]) + size_of_val(self.bonds.words())
+        let cloud = &self.body.cloud;
+        let fields = 2 * size_of_val(&self.concentration[..]) + size_of_val(&cloud.slots[..]);
+        let points = match &cloud.arrangement {
+            Arrangement::Lattice(_) => 0,
+            Arrangement::Scattered { positions, volumes } => size_of_val(&positions[..]) + size_of_val(&volumes[..]),
+        };
+        let families = match &self.body.families {
+            Families::Lattice(families) => size_of_val(&families.blocks[..]),
+            Families::Cloud(families) => {
+                let records = size_of_val(&families.sites.records[..]);
+                size_of_val(&families.starts[..]) + size_of_val(&families.neighbours[..]) + records
+            }
+        };
+        fields + points + families + size_of_val(self.bonds.words()) + self.diffusion.memory()
     }
 }

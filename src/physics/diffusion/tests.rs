@@ -143,12 +143,13 @@ fn a_wave_between_mirrors_decays_at_the_nonlocal_rate() {
             let steps = 4000;
             let dt = 1.0 / (lambda * f64::from(steps));
             assert!(dt < diffusion.stable_step(&body));
+            let whole = BondStates::whole(&body);
             for _ in 0..steps {
                 for i in 0..m {
                     c[slot(m - 1 - i)] = c[slot(m + i)];
                     c[slot(m + cells + i)] = c[slot(m + cells - 1 - i)];
                 }
-                diffusion.rate(&body, &mut exec, &c, &mut rate);
+                diffusion.rate(&body, &whole, &mut exec, &c, &mut rate);
                 c.iter_mut().zip(&rate).for_each(|(c, rate)| *c += dt * rate);
             }
             for i in [m, m + cells / 3, m + cells - 1] {
@@ -171,7 +172,7 @@ fn waves_in_a_plane_decay_at_the_nonlocal_rate() {
     let x0 = body.cloud.position(middle)[0];
     let (mut c, mut rate) = (vec![0.0; body.cloud.n_slots()], vec![0.0; body.cloud.n_slots()]);
     body.cloud.slots.iter().for_each(|&s| c[s as usize] = (k * (body.cloud.position(s as usize)[0] - x0)).cos());
-    diffusion.rate(&body, &mut Exec::default(), &c, &mut rate);
+    diffusion.rate(&body, &BondStates::whole(&body), &mut Exec::default(), &c, &mut rate);
     let (found, expected) = (-rate[middle], decay::<2>(&flux, horizon, k));
     assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
 }
@@ -194,9 +195,9 @@ fn mass_is_conserved() {
             let values = || body.cloud.slots.iter().map(|&s| c[s as usize]);
             values().fold(0.0, f64::max) - values().fold(1.0, f64::min)
         };
-        let noisy = spread(&c);
+        let (noisy, whole) = (spread(&c), BondStates::whole(body));
         for _ in 0..50 {
-            diffusion.rate(body, &mut exec, &c, &mut rate);
+            diffusion.rate(body, &whole, &mut exec, &c, &mut rate);
             c.iter_mut().zip(&rate).for_each(|(c, rate)| *c += dt * rate);
         }
         let after = mass(&body.cloud, &mut exec, &c);
@@ -222,7 +223,7 @@ fn lattices_and_clouds_agree() {
         let mut rate = c.clone();
         let values = noise(body.cloud.n_points());
         body.cloud.slots.iter().zip(values).for_each(|(&slot, value)| c[slot as usize] = value);
-        diffusion.rate(body, &mut Exec::default(), &c, &mut rate);
+        diffusion.rate(body, &BondStates::whole(body), &mut Exec::default(), &c, &mut rate);
         body.cloud.slots.iter().map(|&slot| rate[slot as usize]).collect::<Vec<_>>()
     };
     for q in 0..4 {

@@ -220,7 +220,7 @@ const fn info(name: &'static str, unit: &'static str, about: &'static str) -> Fi
 }
 
 /// The fields of elastic bodies.
-pub(super) fn fields() -> impl Iterator<Item = &'static FieldInfo> {
+pub fn fields() -> impl Iterator<Item = &'static FieldInfo> {
     Elasticity::<2, Double>::FIELDS.iter().map(|(info, _)| info)
 }
 
