@@ -140,6 +140,12 @@ fn bits(simulation: &mut Simulation) -> (String, Vec<u64>, u64) {
 }
 
 fn goes_on_with_its_bits(make: impl Fn() -> Simulation, before: u64, after: u64) {
+    let [middle, end] = goes_on(make, before, after);
+    assert!(end > middle && middle > 0, "bonds break before and after");
+}
+
+/// The same; how many pairs of points have parted before and after.
+fn goes_on(make: impl Fn() -> Simulation, before: u64, after: u64) -> [u64; 2] {
     let mut run = make();
     run.model.start();
     steps(&mut run, before);
@@ -147,8 +153,6 @@ fn goes_on_with_its_bits(make: impl Fn() -> Simulation, before: u64, after: u64)
     run.model.visit(&mut saved);
     let (clock, middle) = (run.clock, run.model.broken_pairs());
     steps(&mut run, after);
-    assert!(run.model.broken_pairs() > middle && middle > 0, "bonds break before and after");
-
     let mut other = make();
     other.model.start();
     steps(&mut other, before / 3);
@@ -158,6 +162,7 @@ fn goes_on_with_its_bits(make: impl Fn() -> Simulation, before: u64, after: u64)
     other.clock = clock;
     steps(&mut other, after);
     assert_eq!(bits(&mut run), bits(&mut other));
+    [middle, run.model.broken_pairs()]
 }
 
 #[test]
@@ -193,5 +198,48 @@ fn hybrid_schemes_while_points_switch() {
         for load in [GRIP, PULL] {
             goes_on_with_its_bits(|| plate(law, &scheme, "velocity_verlet", "", load), 150, 60);
         }
+    }
+}
+
+/// Between a held layer and a source, around a pre-crack.
+fn diffusing(geometry: &str, discretization: &str) -> Simulation {
+    let text = format!(
+        r#"
+        [case]
+        title = "square"
+        dimension = 2
+        [geometry]
+        shape = {{ rectangle = {{ size = [1.0, 1.0] }} }}
+        spacing = 0.025
+        {geometry}
+        [sets]
+        layer = {{ where = "max(abs(x), abs(y)) > 0.5 - 0.1" }}
+        [discretization]
+        horizon_ratio = 4
+        {discretization}
+        [physics.diffusion]
+        diffusivity = 1.0
+        [[conditions]]
+        on = "layer"
+        prescribe = {{ concentration = {{ value = "x*cos(100*t)" }} }}
+        [[conditions]]
+        on = "all"
+        load = {{ source = {{ value = "(1 + y)*sin(200*t)" }} }}
+        [solver.forward_euler]
+        end_time = 0.05
+        time_step = 1e-4
+        "#
+    );
+    let case = read_text::<Case>("case", &text, &[]).expect("a sound case");
+    build(&case, &Options::default()).expect("a case that can be built")
+}
+
+#[test]
+fn what_diffuses_on_lattices_and_clouds_by_bonds_and_rows() {
+    let crack = "cracks = [{ segment = { from = [-0.1, 0.0], to = [0.2, 0.1] } }]";
+    let cloud = "perturb = { amplitude = 0.2, seed = 1 }";
+    let rows = "scheme = { collocation = { order = 2 } }";
+    for (geometry, scheme) in [(crack, ""), (&*format!("{cloud}\n{crack}"), ""), ("", rows), (cloud, rows)] {
+        assert_eq!(goes_on(|| diffusing(geometry, scheme), 150, 60), [0, 0]);
     }
 }
