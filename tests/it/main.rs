@@ -5,6 +5,7 @@ mod common;
 mod diffusion;
 mod engine;
 mod hybrid;
+mod images;
 mod memory;
 mod parity;
 mod patch;

@@ -67,7 +67,7 @@ impl<const D: usize> Builder<'_, D> {
             Motion::Displacement { component, value } => (Quantity::Value, *component, value),
             Motion::Velocity { component, value } => (Quantity::Velocity, *component, value),
         };
-        let name = format!("{}_{}", condition.on, ["x", "y", "z"][component]);
+        let name = format!("{}_{}", condition.on.as_deref().unwrap_or_default(), ["x", "y", "z"][component]);
         let profile = self.profile(value, cloud, &slots, &path)?;
         let mut prescribed = Prescribed::new(name, slots, component, quantity, profile);
         prescribed.until = condition.until.unwrap_or(f64::INFINITY);

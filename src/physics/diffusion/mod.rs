@@ -151,7 +151,7 @@ impl Diffusion {
         Ok(Diffusion(Scheme::Rows(PointRows::new(&rows))))
     }
 
-    /// L C at every point, unit of C per second.
+    /// L C at every point, unit of C per second. Images have the values of their sources.
     pub fn rate<const D: usize>(&self, body: &Body<D>, exec: &mut Exec, concentration: &[f64], rate: &mut [f64]) {
         match &self.0 {
             Scheme::Sum { weights, q, bonds } => {
@@ -218,6 +218,9 @@ impl Diffusion {
         }
         let (mut logarithm, mut half) = (0.0, 0.0);
         for step in 1..=steps {
+            if let Some(images) = &body.cloud.images {
+                images.fill_scalar(&mut field);
+            }
             self.rate(body, exec, &field, &mut rate);
             let mut square = 0.0;
             for &slot in free {

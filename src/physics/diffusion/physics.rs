@@ -60,6 +60,9 @@ impl<const D: usize> Physics for Diffusing<D> {
 
     fn evaluate(&mut self) {
         let Diffusing { body, diffusion, concentration, rate, exec, .. } = self;
+        if let Some(images) = &body.cloud.images {
+            images.fill_scalar(concentration);
+        }
         diffusion.rate(body, exec, concentration, rate);
     }
 
