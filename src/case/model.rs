@@ -135,6 +135,7 @@ pub enum Load {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mirror {
+    /// Across which the plane stands.
     pub axis: Axis,
     /// Which end of the body.
     pub side: Side,
@@ -149,6 +150,7 @@ pub struct Mirror {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Periodic {
+    /// Along which it goes on.
     pub axis: Axis,
     /// For points from a file, which span less.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0))]

@@ -418,6 +418,8 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
         if !self.fuses() {
             return None;
         }
+        // A state-based solid of which no point has a row.
+        self.inner.begin();
         let State { displacement, velocity, force, .. } = state;
         let motion = Motion { displacement, velocity, force, damped: &mut self.damped_displacement };
         let pass = |m: Motion<'_, P::Field>| drift.pass(m.displacement, m.velocity, m.force, m.damped);
