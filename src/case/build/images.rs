@@ -187,13 +187,12 @@ impl<const D: usize> Builder<'_, D> {
                 "a point on a mirror would be its own image: let points stand for whole volumes on one side of it";
             return Err(self.refuse(path, message, help));
         }
-        let width = inside(if mirror.side == Side::Low { high[d] } else { low[d] });
+        // From the plane to the far face of the last cells.
+        let width = inside(if mirror.side == Side::Low { high[d] } else { low[d] }) + 0.5 * cloud.spacing;
         // Images of images along one axis are not made.
         let both = self.mirrors(d).count() == 2;
-        if (shape.is_some() || both)
-            && layers(cloud.spacing, width + 0.5 * cloud.spacing) < layers(cloud.spacing, reach)
-        {
-            let message = format!("the body is {:.3e} m wide along {axis}, and families reach {reach:.3e} m", width);
+        if (shape.is_some() || both) && layers(cloud.spacing, width) < layers(cloud.spacing, reach) {
+            let message = format!("the body is {width:.3e} m wide along {axis}, and families reach {reach:.3e} m");
             return Err(self.refuse(path, message, "make the body wider or the horizon smaller"));
         }
         Ok(at)
