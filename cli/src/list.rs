@@ -92,19 +92,25 @@ fn items(topic: &str, schema: &Value) -> Vec<(String, String)> {
                     all.push((format!("{key}.{item}"), about));
                 }
             }
+            for (key, name) in [("mirror", "Mirror"), ("periodic", "Periodic")] {
+                all.push((key.to_string(), first_line(&schema["$defs"][name])));
+            }
             all
         }
         _ => TYPES.iter().find(|(t, _)| *t == topic).map_or(Vec::new(), |(_, name)| variants(&schema["$defs"][name])),
     }
 }
 
+/// The first paragraph of the documentation of a type in the schema.
+fn first_line(node: &Value) -> String {
+    let text = node["description"].as_str().unwrap_or_default();
+    text.split('\n').take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
 /// Names and first lines of documentation of the variants of an enum in the schema.
 fn variants(schema: &Value) -> Vec<(String, String)> {
     let mut found = Vec::new();
-    let about = |node: &Value| {
-        let text = node["description"].as_str().unwrap_or_default();
-        text.split('\n').take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
-    };
+    let about = first_line;
     for variant in ["oneOf", "anyOf"].iter().filter_map(|k| schema[*k].as_array()).flatten() {
         if let Some(name) = variant["const"].as_str() {
             found.push((name.to_string(), about(variant)));

@@ -451,6 +451,55 @@ fn mistakes() -> Vec<Mistake> {
         Mistake::table("csv_not_utf8", b"x,y,volume\n0,0,1e-6\n1e-3,\xFF,1e-6\n"),
         Mistake::table("csv_set_undefined", "x,y,volume,sets\n0,0,1e-6,high\n0,1e-3,1e-6,low\n")
             .with(&["--set", "conditions.0.on=hihg"]),
+        // Mirrors and periodic ends.
+        patch("condition_without_set", "[[conditions]]\non = \"top\"\n", "[[conditions]]\n"),
+        images("mirror_on_a_set", "on = \"top\"\nuntil = \"1 us\"\nmirror = { axis = \"x\", side = \"low\" }"),
+        images("mirror_across_no_axis", "mirror = { axis = \"z\", side = \"low\" }"),
+        images("mirror_without_side", "mirror = { axis = \"x\" }"),
+        images("mirror_with_plane", "mirror = { axis = \"x\", side = \"low\", at = 0.0 }"),
+        images("mirror_odd", "mirror = { axis = \"x\", side = \"low\", parity = \"odd\" }"),
+        images(
+            "mirror_twice",
+            "mirror = { axis = \"x\", side = \"low\" }\n[[conditions]]\nmirror = { axis = \"x\", side = \"low\" }",
+        ),
+        images(
+            "mirror_of_periodic",
+            "periodic = { axis = \"x\" }\n[[conditions]]\nmirror = { axis = \"x\", side = \"low\" }",
+        ),
+        images("periodic_twice", "periodic = { axis = \"x\" }\n[[conditions]]\nperiodic = { axis = \"x\" }"),
+        images(
+            "periodic_of_refined_cells",
+            "periodic = { axis = \"x\" }\n[refinement]\nlevels = 1\nzones = [{ region = { where = \"x > 0\" }, level = 1 }]",
+        ),
+        Mistake::patch(
+            "periodic_of_corrected_surfaces",
+            &[("influence =", "surface_correction = \"volume\"\ninfluence ="), ("[solver.", PERIODIC)],
+        ),
+        Mistake::patch("periodic_of_broken_cells", &[("h = \"1 mm\"", "h = \"0.7 mm\""), ("[solver.", PERIODIC)]),
+        Mistake::patch(
+            "periodic_sides_of_different_length",
+            &[
+                (
+                    "{ rectangle = { size = [\"20 mm\", \"10 mm\"] } }",
+                    "{ polygon = { vertices = [[-0.01, -0.005], [0.01, -0.005], [0.01, 0.0], [-0.01, 0.005]] } }",
+                ),
+                ("[solver.", PERIODIC),
+            ],
+        ),
+        Mistake::patch(
+            "periodic_shorter_than_a_family",
+            &[("horizon = \"3*h\"", "horizon = \"11*h\""), ("[solver.", PERIODIC)],
+        ),
+        Mistake::patch(
+            "mirror_nearer_than_families_reach",
+            &[
+                ("horizon = \"3*h\"", "horizon = \"11*h\""),
+                ("[solver.", "[[conditions]]\nmirror = { axis = \"y\", side = \"low\" }\n\n[solver."),
+            ],
+        ),
+        table_with_images("csv_mirror_without_plane", "mirror = { axis = \"x\", side = \"low\" }"),
+        table_with_images("csv_points_beyond_a_mirror", "mirror = { axis = \"x\", side = \"high\", at = 0.001 }"),
+        table_with_images("csv_period_below_extent", "periodic = { axis = \"x\", period = 0.002 }"),
         // Where results go.
         Mistake::called("out_is_a_file", &[]).prepare(|at| fs::write(at.join("out"), "mine").unwrap()),
         Mistake::called("out_is_not_empty", &[]).prepare(|at| {
@@ -464,6 +513,20 @@ fn mistakes() -> Vec<Mistake> {
         list.push(Mistake::called("device_as_case", &[]).target("/dev/zero"));
     }
     list
+}
+
+const PERIODIC: &str = "[[conditions]]\nperiodic = { axis = \"x\" }\n\n[solver.";
+
+/// A condition before the solver of the good case.
+fn images(name: &'static str, condition: &str) -> Mistake {
+    Mistake::patch(name, &[("[solver.", &format!("[[conditions]]\n{condition}\n\n[solver."))])
+}
+
+/// Three points in a row, and a condition.
+fn table_with_images(name: &'static str, condition: &str) -> Mistake {
+    let table = "x,y,volume\n0,0,1e-6\n1e-3,0,1e-6\n2e-3,0,1e-6\n";
+    let case = format!("{CLOUD}\n[[conditions]]\n{condition}\n");
+    Mistake { beside: Some(("points.csv", table.into())), ..Mistake::whole(name, case) }
 }
 
 /// A case of points from a table.

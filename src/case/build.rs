@@ -4,6 +4,7 @@ mod conditions;
 mod diffusion;
 mod geometry;
 mod hybrid;
+mod images;
 mod materials;
 mod outputs;
 
@@ -180,6 +181,7 @@ impl<const D: usize> Builder<'_, D> {
                 cloud = scattered;
             }
         }
+        cloud = self.with_images(cloud, shape.as_ref(), rule, horizon)?;
         self.sets(&mut cloud, shape.as_ref())?;
         let critical = |values: &Values, energy: f64| match &solid {
             Some(_) => moduli_of(values).critical_stretch(&influence, energy, horizon),
@@ -255,10 +257,11 @@ impl<const D: usize> Builder<'_, D> {
         for crack in &cracks {
             elasticity.cut(crack, tolerance);
         }
-        let (mut constraints, mut terms) = (Vec::new(), Vec::new());
+        let (mut constraints, mut terms) = (Vec::new(), self.mirror_forces(&elasticity.body.cloud));
         for (k, condition) in case.conditions.iter().enumerate() {
             let Elasticity { body, state, .. } = &mut elasticity;
-            let slots = self.slots(&condition.on, &body.cloud, &format!("conditions[{k}].on"))?;
+            let Some(on) = &condition.on else { continue };
+            let slots = self.slots(on, &body.cloud, &format!("conditions[{k}].on"))?;
             if let Some(motion) = &condition.initial {
                 let (flat, component, value) = match motion {
                     Motion::Displacement { component, value } => (&mut state.displacement, *component, value),

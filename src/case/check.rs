@@ -1,6 +1,7 @@
 //! Rules across keys: what one key alone cannot tell. Each mistake is located at the key that has to change.
 
 mod diffusion;
+mod images;
 mod materials;
 
 use std::collections::BTreeSet;
@@ -90,17 +91,25 @@ impl Checker<'_> {
         materials::check(self, case, &mut used);
         for (k, condition) in case.conditions.iter().enumerate() {
             let path = format!("conditions[{k}]");
-            self.set_name(&condition.on, case, imported, &format!("{path}.on"), &mut used);
-            let given = [condition.initial.is_some(), condition.prescribe.is_some(), condition.load.is_some()];
-            match given.iter().filter(|g| **g).count() {
+            let acts = [condition.initial.is_some(), condition.prescribe.is_some(), condition.load.is_some()];
+            let given = acts.into_iter().chain([condition.mirror.is_some(), condition.periodic.is_some()]);
+            match &condition.on {
+                Some(on) => self.set_name(on, case, imported, &format!("{path}.on"), &mut used),
+                None if acts.contains(&true) => {
+                    let message = "missing key `on`: the set of points that this condition acts on";
+                    self.error(&path, message, "add `on = \"<set>\"`, such as `on = \"all\"`");
+                }
+                None => {}
+            }
+            match given.filter(|g| *g).count() {
                 0 => {
-                    let message = "this condition does nothing: `initial`, `prescribe` or `load` is missing";
+                    let message = "this condition does nothing: `initial`, `prescribe`, `load`, `mirror` or `periodic` is missing";
                     let help = "add one, such as `initial = { velocity = { component = 0, value = 1.0 } }`";
                     self.error(&path, message, help);
                 }
                 1 => {}
                 _ => {
-                    let message = "a condition has exactly one of `initial`, `prescribe`, `load`";
+                    let message = "a condition has exactly one of `initial`, `prescribe`, `load`, `mirror`, `periodic`";
                     self.error(&path, message, "give each its own [[conditions]] table");
                 }
             }
@@ -129,6 +138,7 @@ impl Checker<'_> {
                 _ => {}
             }
         }
+        self.images(case);
         self.solvers(case);
         self.outputs(case);
         // Next to a mistake, such as a misspelt name, it would be an echo.

@@ -62,17 +62,22 @@ pub struct Header {
     pub dimension: usize,
 }
 
-/// Something that acts on the points of a set: exactly one of `initial`, `prescribe`, `load`.
+/// Something that acts on the points of a set, exactly one of `initial`, `prescribe`, `load`; or what is beyond an end of the
+/// body, `mirror` or `periodic`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// Name of a set, or `all`.
-    pub on: String,
+    /// Name of a set, or `all`. Needed but by `mirror` and `periodic`, which are about the whole body.
+    pub on: Option<String>,
     /// Values at t = 0.
     pub initial: Option<Motion>,
     /// Values imposed while t ≤ until.
     pub prescribe: Option<Motion>,
     pub load: Option<Load>,
+    /// The body goes on as its own image beyond a plane.
+    pub mirror: Option<Mirror>,
+    /// The body goes on beyond its end as it begins.
+    pub periodic: Option<Periodic>,
     /// When a prescribed value is released or a load ends.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
     pub until: Option<f64>,
@@ -176,6 +181,51 @@ impl Load {
             Load::Flux { .. } => "flux",
         }
     }
+}
+
+/// A plane across an axis, at which the body goes on as its own image: the face of its outermost cells.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Mirror {
+    /// Across which the plane stands.
+    pub axis: Axis,
+    /// Which end of the body.
+    pub side: Side,
+    #[serde(default)]
+    pub parity: Parity,
+    /// Coordinate of the plane, for points from a file; none may lie on it or beyond.
+    #[schemars(extend("x-unit" = "m"))]
+    pub at: Option<f64>,
+}
+
+/// An axis along which the body goes on beyond its end as it begins: its period is the length of its cells.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Periodic {
+    /// Along which it goes on.
+    pub axis: Axis,
+    /// For points from a file, which span less.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0))]
+    pub period: Option<f64>,
+}
+
+/// An end of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Side {
+    Low,
+    High,
+}
+
+/// How motion is mirrored.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Parity {
+    /// Symmetric: displacements across the plane change their sign, those along it do not.
+    #[default]
+    Even,
+    /// Antisymmetric: the other way round. For linear laws without failure.
+    Odd,
 }
 
 /// A number, or a formula of place and time.

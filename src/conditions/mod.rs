@@ -5,11 +5,13 @@
 
 pub mod initial;
 pub mod load;
+pub mod mirror;
 pub mod prescribed;
 pub mod profile;
 pub mod random;
 
 pub use load::Load;
+pub use mirror::MirrorForce;
 pub use prescribed::{Prescribed, Quantity};
 pub use profile::FormulaAtPoints;
 
@@ -119,6 +121,12 @@ pub trait Term: Send {
     fn restart(&mut self);
     /// Adds its force density at time `t` to those of a body at rest; `n` slots.
     fn force(&mut self, t: f64, load: &mut [f64], n: usize);
+    /// A body has come to rest with these internal forces on its points, N; `n` slots.
+    fn settle(&mut self, _internal: &[f64], _n: usize) {}
+    /// The force by which something holds the body, N, and the name of its column; None of what is given.
+    fn reaction(&self) -> Option<(&str, f64)> {
+        None
+    }
 
     /// Takes note of the volumes of its points.
     fn measure(&mut self, volumes: Volumes<'_>);

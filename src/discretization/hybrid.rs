@@ -102,6 +102,8 @@ impl Regions {
 
     fn clear_families<const D: usize>(&mut self, body: &Body<D>, slots: &[u32]) -> bool {
         let (lattice, families) = parts(body);
+        // Where the image of a point is seen, the point itself is seen by the image of who sees it.
+        let images = body.cloud.images.as_ref();
         let mut changed = false;
         let mut clear = |slot: usize| {
             let (word, bit) = (&mut self.rows[slot / BLOCK], 1 << (slot % BLOCK));
@@ -118,7 +120,8 @@ impl Regions {
             clear(slot as usize);
             for offset in &families.offsets {
                 if let Some(there) = lattice.neighbour(cell, offset.step) {
-                    clear(lattice.slot(there));
+                    let there = lattice.slot(there);
+                    clear(images.map_or(there, |images| images.source(there).0));
                 }
             }
         }

@@ -148,6 +148,7 @@ impl<const D: usize> Body<D> {
             Arrangement::Scattered { positions, volumes } => {
                 let mut families = search::families(positions, rim, &|_, _, xi| accept(xi));
                 families.sites = Sites::new(positions, volumes);
+                families.keep(cloud.n_points());
                 Families::Cloud(families)
             }
         };
@@ -289,6 +290,13 @@ impl<const D: usize> LatticeFamilies<D> {
 }
 
 impl CloudFamilies {
+    /// Empties the families of all but the first `n` slots: images are seen, and see nobody.
+    fn keep(&mut self, n: usize) {
+        let groups = self.starts[n];
+        self.starts[n..].fill(groups);
+        self.neighbours.truncate(groups as usize * GROUP);
+    }
+
     /// The neighbours of a point with the index of their bond, padding included.
     #[inline]
     pub fn of(&self, point: usize) -> Range<usize> {

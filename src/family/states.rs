@@ -33,10 +33,15 @@ impl BondStates {
                 for &slot in &body.cloud.slots {
                     present[slot as usize / BLOCK] |= 1 << (slot as usize % BLOCK);
                 }
+                let own = present.clone();
+                // Images are seen, and see nobody.
+                for (slot, ..) in body.cloud.images.iter().flat_map(|images| images.iter()) {
+                    present[slot / BLOCK] |= 1 << (slot % BLOCK);
+                }
                 let first = lattice.guard / BLOCK;
                 let row_blocks = lattice.counts[0].div_ceil(BLOCK);
                 words.par_chunks_mut(families.offsets.len().max(1)).enumerate().for_each(|(block, words)| {
-                    let here = present[first + block];
+                    let here = own[first + block];
                     if here == 0 {
                         return;
                     }

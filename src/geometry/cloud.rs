@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::{Lattice, PointSets, Shape, curve};
+use super::{Images, Lattice, PointSets, Shape, curve};
 use crate::field::Vector;
 use crate::parallel;
 
@@ -14,7 +14,7 @@ use crate::parallel;
 pub enum Arrangement<const D: usize> {
     /// Cells of a box; a point's place follows from its slot.
     Lattice(Lattice<D>),
-    /// Anywhere, slot by slot along a curve. Positions in m; volumes in m³ (3D), m² (2D), m (1D).
+    /// Anywhere, slot by slot along a curve, images behind all points. Positions in m; volumes in m³ (3D), m² (2D), m (1D).
     Scattered { positions: Vec<Vector<D>>, volumes: Vec<f64> },
 }
 
@@ -27,6 +27,8 @@ pub struct Cloud<const D: usize> {
     /// Δx, m: the lattice spacing, or the mean of volume^(1/D) of a scattered cloud.
     pub spacing: f64,
     pub sets: PointSets,
+    /// What points see beyond mirrors and periodic ends; none of these is a point.
+    pub images: Option<Images<D>>,
 }
 
 impl<const D: usize> Cloud<D> {
@@ -35,14 +37,7 @@ impl<const D: usize> Cloud<D> {
     ///
     /// A [`Shape::Box`] is filled whole, without asking each centre, so that rounding cannot lose a row.
     pub fn lattice(shape: &Shape<D>, spacing: f64, reach: usize) -> Self {
-        let (low, high) = shape.bounds();
-        let counts: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round().max(1.0) as usize);
-        let corner = std::array::from_fn(|d| {
-            let centre = 0.5 * (low[d] + high[d]);
-            // An exact fit keeps the shape's own corner: no rounding from the centre.
-            let exact = ((high[d] - low[d]) / spacing - counts[d] as f64).abs() < 1e-6;
-            if exact { low[d] } else { centre - 0.5 * counts[d] as f64 * spacing }
-        });
+        let (corner, counts) = cells_of(shape, spacing);
         let lattice = Lattice::new(corner, spacing, counts, reach);
         let whole = matches!(shape, Shape::Box { .. });
         let mut slots = Vec::new();
@@ -51,7 +46,7 @@ impl<const D: usize> Cloud<D> {
                 slots.push(lattice.slot(cell) as u32);
             }
         });
-        Cloud { arrangement: Arrangement::Lattice(lattice), slots, spacing, sets: PointSets::default() }
+        Cloud { arrangement: Arrangement::Lattice(lattice), slots, spacing, sets: PointSets::default(), images: None }
     }
 
     /// Points anywhere, with their volumes, stored along a Hilbert curve.
@@ -70,6 +65,7 @@ impl<const D: usize> Cloud<D> {
             slots,
             spacing: mean.powf(1.0 / D as f64),
             sets: PointSets::default(),
+            images: None,
         }
     }
 
@@ -99,7 +95,7 @@ impl<const D: usize> Cloud<D> {
         let slots = (0..positions.len() as u32).collect();
         let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
         let arrangement = Arrangement::Scattered { positions, volumes };
-        Cloud { arrangement, slots, spacing: mean.powf(1.0 / D as f64), sets: PointSets::default() }
+        Cloud { arrangement, slots, spacing: mean.powf(1.0 / D as f64), sets: PointSets::default(), images: None }
     }
 
     pub fn n_points(&self) -> usize {
@@ -163,6 +159,19 @@ impl<const D: usize> Cloud<D> {
         slots.sort_unstable();
         slots
     }
+}
+
+/// Lower corner (m) and number of the cells of the box that [`Cloud::lattice`] fills.
+pub fn cells_of<const D: usize>(shape: &Shape<D>, spacing: f64) -> (Vector<D>, [usize; D]) {
+    let (low, high) = shape.bounds();
+    let counts: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round().max(1.0) as usize);
+    let corner = std::array::from_fn(|d| {
+        let centre = 0.5 * (low[d] + high[d]);
+        // An exact fit keeps the shape's own corner: no rounding from the centre.
+        let exact = ((high[d] - low[d]) / spacing - counts[d] as f64).abs() < 1e-6;
+        if exact { low[d] } else { centre - 0.5 * counts[d] as f64 * spacing }
+    });
+    (corner, counts)
 }
 
 /// Calls `visit` for each cell of a box, in storage order (x fastest).

@@ -13,12 +13,14 @@ pub const BLOCK: usize = 16;
 /// The indexing of a box of cubic cells.
 #[derive(Debug, Clone)]
 pub struct Lattice<const D: usize> {
-    /// Lower corner of the box, m. The point of cell `i` sits at `low + (i + 1/2) spacing`.
+    /// Lower corner of the box, m, without cells of images. The point of cell `i` sits at `low + (i - before + 1/2) spacing`.
     pub low: Vector<D>,
     /// Δx, m.
     pub spacing: f64,
-    /// Cells along each axis.
+    /// Cells along each axis, those of images included.
     pub counts: [usize; D],
+    /// Of these, cells of images before the first of the body, along each axis.
+    pub before: [usize; D],
     /// Distance in slots to the next cell along each axis.
     pub strides: [usize; D],
     /// Slots before the first row and behind the last: at least the largest distance of a neighbour.
@@ -37,7 +39,13 @@ impl<const D: usize> Lattice<D> {
             length *= counts[d];
         }
         let guard = strides.iter().map(|s| s * reach).sum::<usize>().next_multiple_of(BLOCK);
-        Lattice { low, spacing, counts, strides, guard, n_slots: guard + length + guard }
+        Lattice { low, spacing, counts, before: [0; D], strides, guard, n_slots: guard + length + guard }
+    }
+
+    /// With layers of cells of images before and after its own, along each axis; `reach` as of [`Lattice::new`].
+    pub fn with_layers(&self, before: [usize; D], after: [usize; D], reach: usize) -> Self {
+        let counts = std::array::from_fn(|d| before[d] + self.counts[d] + after[d]);
+        Lattice { before, ..Lattice::new(self.low, self.spacing, counts, reach) }
     }
 
     /// Blocks of [`BLOCK`] slots between the guards.
@@ -71,7 +79,7 @@ impl<const D: usize> Lattice<D> {
     /// x of a cell, m.
     #[inline]
     pub fn position(&self, cell: [usize; D]) -> Vector<D> {
-        std::array::from_fn(|d| self.low[d] + (cell[d] as f64 + 0.5) * self.spacing)
+        std::array::from_fn(|d| self.low[d] + (cell[d] as f64 - self.before[d] as f64 + 0.5) * self.spacing)
     }
 
     /// Volume (3D, m³), area (2D, m²) or length (1D, m) of a cell.

@@ -3,13 +3,15 @@
 pub mod cloud;
 pub mod cracks;
 pub mod curve;
+pub mod images;
 pub mod lattice;
 mod polygon;
 pub mod sets;
 pub mod shapes;
 
-pub use cloud::{Arrangement, Cloud};
+pub use cloud::{Arrangement, Cloud, for_each_cell};
 pub use cracks::Crack;
+pub use images::{Ends, Images, Mirror, Parity};
 pub use lattice::Lattice;
 pub use sets::PointSets;
 pub use shapes::Shape;

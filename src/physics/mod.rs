@@ -160,6 +160,9 @@ pub trait Points {
     fn horizon(&self) -> f64;
     /// Bonds of each point that hold, in point order.
     fn bonds_that_hold(&self, states: &BondStates) -> Vec<u32>;
+    /// Calls `visit` with the slot of each image, that of its source, and the sign of each component of a vector, which is 1
+    /// beyond the dimension.
+    fn visit_images(&self, _visit: &mut dyn FnMut(usize, usize, [f64; 3])) {}
     /// x and x′ (m) of the bond whose state is bit `bit % 16` of word `bit / 16`.
     fn ends(&self, bit: usize) -> [[f64; 3]; 2];
 }
@@ -197,6 +200,11 @@ impl<const D: usize> Points for Body<D> {
     }
     fn bonds_that_hold(&self, states: &BondStates) -> Vec<u32> {
         states.per_point(self)
+    }
+    fn visit_images(&self, visit: &mut dyn FnMut(usize, usize, [f64; 3])) {
+        for (slot, source, signs) in self.cloud.images.iter().flat_map(|images| images.iter()) {
+            visit(slot, source, std::array::from_fn(|d| signs.get(d).copied().unwrap_or(1.0)));
+        }
     }
     fn ends(&self, bit: usize) -> [[f64; 3]; 2] {
         self.ends_of(bit).map(|slot| embed(&self.cloud.position(slot)))

@@ -208,6 +208,9 @@ impl<'a> StaticSystem<'a> {
             let reaction = -slots.iter().map(|&slot| state.total[component * n + slot as usize]).sum::<f64>();
             constraint.react(reaction);
         }
+        let mut internal = state.total.clone();
+        vector::add(-1.0, &state.load, &mut internal);
+        self.terms.iter_mut().for_each(|term| term.settle(&internal, n));
     }
 }
 
@@ -447,6 +450,11 @@ impl Equilibrium for StaticSystem<'_> {
             let of_axis = |kind: Kind| points.slots().iter().filter(move |&&s| self.kind[d * n + s as usize] == kind);
             held.extend(of_axis(Kind::Held).map(|&slot| (d, points.position(slot as usize))));
         }
+        // What motions of images would differ from the images of motions: mirrors and periods hold a body too.
+        let mut beyond = Vec::new();
+        points.visit_images(&mut |image, source, signs| {
+            beyond.push((points.position(image), points.position(source), signs));
+        });
         // The combinations of motions that leave every held unknown where it is: motions are made independent on the
         // held unknowns, one after the other; what is left of one that depends on those before it is such a combination.
         let count = axes + planes.len();
@@ -456,6 +464,10 @@ impl Equilibrium for StaticSystem<'_> {
             let mut weights = vec![0.0; count];
             weights[m] = 1.0;
             let mut there: Vec<f64> = held.iter().map(|(d, x)| motion(m, *d, x)).collect();
+            let apart = |(image, source, signs): &([f64; 3], [f64; 3], [f64; 3])| {
+                (0..axes).map(|d| motion(m, d, image) - signs[d] * motion(m, d, source)).collect::<Vec<f64>>()
+            };
+            there.extend(beyond.iter().flat_map(apart));
             let whole = vector::norm(&there);
             for _ in 0..2 {
                 for (unit, of) in &independent {

@@ -83,7 +83,10 @@ impl Source for Model {
         self.problem.broken_pairs()
     }
     fn reactions(&self) -> Vec<(String, f64)> {
-        self.problem.constraints.iter().map(|c| (c.name().to_string(), c.reaction())).collect()
+        let held = self.problem.constraints.iter().map(|c| (c.name(), c.reaction()));
+        held.chain(self.problem.terms.iter().filter_map(|t| t.reaction()))
+            .map(|(name, f)| (name.to_string(), f))
+            .collect()
     }
     fn adapted(&self) -> Option<Adapted> {
         self.problem.physics.adapted()

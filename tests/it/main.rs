@@ -6,6 +6,7 @@ mod diffusion;
 mod diffusion_cases;
 mod engine;
 mod hybrid;
+mod images;
 mod materials;
 mod memory;
 mod parity;

@@ -69,8 +69,8 @@ impl<const D: usize> Builder<'_, D> {
             Motion::Concentration { value } => (Quantity::Value, 0, value),
         };
         let name = match motion {
-            Motion::Concentration { .. } => condition.on.clone(),
-            _ => format!("{}_{}", condition.on, ["x", "y", "z"][component]),
+            Motion::Concentration { .. } => condition.on.clone().unwrap_or_default(),
+            _ => format!("{}_{}", condition.on.as_deref().unwrap_or_default(), ["x", "y", "z"][component]),
         };
         let profile = self.profile(value, cloud, &slots, &path)?;
         let mut prescribed = Prescribed::new(name, slots, component, quantity, profile);

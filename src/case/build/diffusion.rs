@@ -39,6 +39,7 @@ impl<const D: usize> Builder<'_, D> {
         let mut cloud = self.cloud(shape.as_ref(), rule)?;
         let horizon = self.horizon(&cloud)?;
         let tolerance = 1e-9 * cloud.spacing;
+        cloud = self.with_images(cloud, shape.as_ref(), rule, horizon)?;
         self.sets(&mut cloud, shape.as_ref())?;
         let several = self.diffusivities(&mut cloud)?;
         // What the weights are made for; where materials differ, that of the first point.
@@ -93,10 +94,11 @@ impl<const D: usize> Builder<'_, D> {
         diffusing: &mut Diffusing<D>,
         shape: Option<&Shape<D>>,
     ) -> Result<(Vec<Box<dyn Constraint>>, Vec<Box<dyn Term>>)> {
-        let (mut constraints, mut terms) = (Vec::new(), Vec::new());
+        let (mut constraints, mut terms) = (Vec::new(), self.mirror_amount(&diffusing.body.cloud));
         for (k, condition) in self.case.value.conditions.iter().enumerate() {
             let Diffusing { body, concentration, .. } = &mut *diffusing;
-            let slots = self.slots(&condition.on, &body.cloud, &format!("conditions[{k}].on"))?;
+            let Some(on) = &condition.on else { continue };
+            let slots = self.slots(on, &body.cloud, &format!("conditions[{k}].on"))?;
             if let Some(Motion::Concentration { value }) = &condition.initial {
                 let path = format!("conditions[{k}].initial.concentration.value");
                 let mut profile = self.profile(value, &body.cloud, &slots, &path)?;
@@ -163,8 +165,10 @@ impl<const D: usize> Builder<'_, D> {
     fn free_points(&self, cloud: &Cloud<D>) -> Result<Vec<u32>> {
         let mut held: Vec<Arc<[u32]>> = Vec::new();
         for (k, condition) in self.case.value.conditions.iter().enumerate() {
-            if condition.prescribe.is_some() && condition.until.is_none() {
-                held.push(self.slots(&condition.on, cloud, &format!("conditions[{k}].on"))?);
+            if let Some(on) =
+                condition.on.as_ref().filter(|_| condition.prescribe.is_some() && condition.until.is_none())
+            {
+                held.push(self.slots(on, cloud, &format!("conditions[{k}].on"))?);
             }
         }
         Ok(cloud

@@ -222,7 +222,7 @@ impl<const D: usize> Builder<'_, D> {
         let (low, high) = shape.bounds();
         let mut points = 1.0;
         for d in 0..D {
-            points *= ((high[d] - low[d]) / spacing).round().max(1.0);
+            points *= ((high[d] - low[d]) / spacing).round().max(1.0) + self.imaged_ends(d) as f64 * reach;
         }
         let ball = [2.0, std::f64::consts::PI, 4.0 / 3.0 * std::f64::consts::PI][D - 1];
         let family = ball * (reach - 1.0).powi(D as i32);

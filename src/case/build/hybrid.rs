@@ -105,8 +105,8 @@ impl<const D: usize> Builder<'_, D> {
         for (k, condition) in case.conditions.iter().enumerate() {
             // A body force may act on all of the body.
             let surface = matches!(condition.load, Some(model::Load::Traction { .. } | model::Load::Pressure { .. }));
-            if surface || condition.prescribe.is_some() {
-                names.push((&condition.on, format!("conditions[{k}].on")));
+            if let (true, Some(on)) = (surface || condition.prescribe.is_some(), &condition.on) {
+                names.push((on, format!("conditions[{k}].on")));
             }
         }
         let mut sets = Vec::new();

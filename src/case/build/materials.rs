@@ -154,6 +154,12 @@ impl<const D: usize> Builder<'_, D> {
         for (k, name) in found.names.clone().iter().enumerate() {
             self.fill(&mut found, k, &self.case.value.materials[name], cloud, critical)?;
         }
+        if let Some(images) = &cloud.images {
+            images.copy(&mut found.material);
+            [&mut found.young, &mut found.density, &mut found.stretch]
+                .into_iter()
+                .for_each(|values| images.copy(values));
+        }
         Ok(Some(found))
     }
 
@@ -177,6 +183,9 @@ impl<const D: usize> Builder<'_, D> {
                 volume: slots.iter().map(|&slot| cloud.volume(slot as usize)).sum(),
                 diffusivity: values.iter().copied().fold(0.0, f64::max),
             });
+        }
+        if let Some(images) = &cloud.images {
+            images.copy(&mut found);
         }
         Ok(Some((found, list)))
     }

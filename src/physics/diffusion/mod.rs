@@ -149,7 +149,8 @@ impl Diffusion {
         Ok(Diffusion(Scheme::Rows(PointRows::new(&rows))))
     }
 
-    /// L C at every point, unit of C per second. Bonds that do not hold carry nothing; rows of their own know no bonds.
+    /// L C at every point, unit of C per second. Bonds that do not hold carry nothing; rows of their own know no bonds. Images have
+    /// the values of their sources.
     pub fn rate<const D: usize>(
         &self,
         body: &Body<D>,
@@ -241,6 +242,9 @@ impl Diffusion {
         }
         let (mut logarithm, mut half) = (0.0, 0.0);
         for step in 1..=steps {
+            if let Some(images) = &body.cloud.images {
+                images.fill_scalar(&mut field);
+            }
             self.rate(body, &whole, exec, &field, &mut rate);
             let mut square = 0.0;
             for &slot in free {

@@ -79,6 +79,9 @@ impl<const D: usize> Physics for Diffusing<D> {
 
     fn evaluate(&mut self) {
         let Diffusing { body, diffusion, concentration, rate, bonds, exec, .. } = self;
+        if let Some(images) = &body.cloud.images {
+            images.fill_scalar(concentration);
+        }
         diffusion.rate(body, bonds, exec, concentration, rate);
     }
 

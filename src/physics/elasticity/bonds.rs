@@ -77,7 +77,7 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
         on: &mut On<'_, D>,
         state: &mut State<P>,
         step: Option<f64>,
-        edge: Option<&RowBoundary<'_>>,
+        edge: Option<&RowBoundary<'_, D>>,
     ) {
         let State { displacement, velocity, force, states, broken } = state;
         let (u, force, kernel) = (components::<D, _>(displacement), components_mut::<D, _>(force), Force(self.law));
@@ -187,7 +187,7 @@ struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
     displacement: [&'a [F]; D],
     velocity: [&'a [F]; D],
     dt: f64,
-    edge: Option<&'a RowBoundary<'a>>,
+    edge: Option<&'a RowBoundary<'a, D>>,
 }
 
 impl<const D: usize, L: BondLaw<D>, F: Number> BreakRule<D> for Breaking<'_, D, L, F> {

@@ -155,7 +155,8 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
 
     /// The first pass of the points that sum their bonds, and which bonds are beyond their critical stretch.
     fn first_pass_of_bonds(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>) -> Overstretched {
-        let edge = RowBoundary { regions: &self.regions, overstretched: Mutex::default() };
+        let images = on.body.cloud.images.as_ref();
+        let edge = RowBoundary { regions: &self.regions, images, overstretched: Mutex::default() };
         let (inner, damped) = (&mut self.inner, &mut self.damped_displacement);
         with_damped_displacement(damped, if self.damps_bonds { self.damping } else { 0.0 }, state, |state| {
             inner.first_pass(on, state, step, Some(&edge));
@@ -194,9 +195,16 @@ impl<const D: usize, P: Packs> Hybrid<D, P> {
         on.exec.collocate_gradient::<D, P>(on.body, slope, &self.regions, p, force);
     }
 
-    /// u + τ v
-    fn damp(&mut self, displacement: &[P::Field], velocity: &[P::Field]) {
-        if self.damping == 0.0 || std::mem::take(&mut self.is_damped) {
+    /// u + τ v, of images too.
+    fn damp(&mut self, body: &Body<D>, displacement: &[P::Field], velocity: &[P::Field]) {
+        if self.damping == 0.0 {
+            return;
+        }
+        if std::mem::take(&mut self.is_damped) {
+            // By a drift, in which images take no part.
+            if let Some(images) = &body.cloud.images {
+                images.fill(&mut self.damped_displacement);
+            }
             return;
         }
         self.damped_displacement.resize(displacement.len(), P::Field::default());
@@ -293,7 +301,7 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
     }
 
     fn evolve(&mut self, on: &mut On<'_, D>, state: &mut State<P>, dt: f64) {
-        self.damp(&state.displacement, &state.velocity);
+        self.damp(on.body, &state.displacement, &state.velocity);
         self.inner.begin();
         let strained = self.first_rows(on, state);
         self.sum_bonds_and_switch(&strained, on, state, dt);
@@ -301,7 +309,7 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
 
     /// Nothing switches.
     fn evaluate(&mut self, on: &mut On<'_, D>, state: &mut State<P>) {
-        self.damp(&state.displacement, &state.velocity);
+        self.damp(on.body, &state.displacement, &state.velocity);
         self.first_rows(on, state);
         self.first_pass_of_bonds(on, state, None);
         self.last_rows(on, state);
@@ -309,7 +317,13 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
     }
 
     /// The regions are its own: it is asked to [`evolve`](Material::evolve) and [`evaluate`](Material::evaluate) only.
-    fn first_pass(&mut self, on: &mut On<'_, D>, state: &mut State<P>, step: Option<f64>, _: Option<&RowBoundary<'_>>) {
+    fn first_pass(
+        &mut self,
+        on: &mut On<'_, D>,
+        state: &mut State<P>,
+        step: Option<f64>,
+        _: Option<&RowBoundary<'_, D>>,
+    ) {
         match step {
             Some(dt) => self.evolve(on, state, dt),
             None => self.evaluate(on, state),
@@ -406,6 +420,8 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
         if !self.fuses() {
             return None;
         }
+        // A state-based solid of which no point has a row.
+        self.inner.begin();
         let State { displacement, velocity, force, .. } = state;
         let motion = Motion { displacement, velocity, force, damped: &mut self.damped_displacement };
         let pass = |m: Motion<'_, P::Field>| drift.pass(m.displacement, m.velocity, m.force, m.damped);
@@ -428,6 +444,9 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
         parallel::fill(&mut self.damped_displacement, CHUNK, &|first, damped| {
             damped.iter_mut().zip(&state.velocity[first..]).for_each(|(damped, v)| *damped = tau * *v);
         });
+        if let Some(images) = &on.body.cloud.images {
+            images.fill(&mut self.damped_displacement);
+        }
         let mut density = vec![P::Field::default(); on.body.cloud.n_slots()];
         let input = components::<D, _>(&self.damped_displacement);
         self.energy_density(on, &state.states, input, &mut density);

@@ -76,6 +76,10 @@ impl<L, F: Number> LinearSolid<L, F> {
         let (mut exec, whole, n) = (Exec::default(), BondStates::whole(body), body.cloud.n_slots());
         let mut stiffness = vec![0.0; n];
         exec.sum_bonds::<D, 0, 1, Double>(body, weights, &whole, [], [&mut stiffness], &Moment);
+        // Images have the families of their sources.
+        if let Some(images) = &body.cloud.images {
+            images.copy(&mut stiffness);
+        }
         // A point without a family has neither.
         let over = |numerator: f64, moment: f64| if moment > 0.0 { numerator / moment } else { 0.0 };
         let of = |slot: usize| moduli[slot.min(moduli.len() - 1)];
@@ -213,7 +217,7 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
         on: &mut On<'_, D>,
         state: &mut State<P>,
         step: Option<f64>,
-        edge: Option<&RowBoundary<'_>>,
+        edge: Option<&RowBoundary<'_, D>>,
     ) {
         let [u, v] = [&state.displacement, &state.velocity].map(|flat| components::<D, _>(flat));
         let n = on.body.cloud.n_slots();
@@ -248,6 +252,10 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
     }
 
     fn second_pass(&mut self, on: &mut On<'_, D>, state: &mut State<P>) {
+        // Dilatation is a scalar; those of images are known when those of all points are.
+        if let Some(images) = &on.body.cloud.images {
+            images.fill_scalar(&mut self.dilatation_force[0]);
+        }
         let State { displacement, force, states, .. } = state;
         let (u, force) = (components::<D, _>(displacement), components_mut::<D, _>(force));
         self.pull::<D, P>(on, states, u, &self.dilatation_force[0], force);
@@ -269,6 +277,9 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
         let mut p = vec![0.0; on.body.cloud.n_slots()];
         self.sum::<D, Double>(on, states, u, &mut p);
         self.scale(&mut p);
+        if let Some(images) = &on.body.cloud.images {
+            images.fill_scalar(&mut p);
+        }
         self.pull::<D, Double>(on, states, u, &p, force);
     }
 
@@ -339,7 +350,10 @@ fn row_sums<const D: usize>(body: &Body<D>, weights: &BondWeights, stiffness: &[
     let [bonds, ..] = sums(stiffness);
     let [_, length, directions @ ..] = sums(&vec![0.5; n]);
     let lean: Vec<f64> = (0..n).map(|i| directions[..D].iter().map(|d| d[i] * d[i]).sum::<f64>().sqrt()).collect();
-    let push: Vec<f64> = (0..n).map(|i| bulk[i].max(0.0) * (length[i] + lean[i])).collect();
+    let mut push: Vec<f64> = (0..n).map(|i| bulk[i].max(0.0) * (length[i] + lean[i])).collect();
+    if let Some(images) = &body.cloud.images {
+        images.copy(&mut push);
+    }
     let [_, pushed, ..] = sums(&push);
     let with = (0..n).map(|i| 2.0 * bonds[i] + pushed[i] + push[i] * (lean[i] - length[i])).collect();
     [with, (0..n).map(|i| 2.0 * bonds[i]).collect()]
@@ -518,7 +532,7 @@ struct Breaking<'a, const D: usize, B, F> {
     displacement: [&'a [F]; D],
     velocity: [&'a [F]; D],
     dt: f64,
-    edge: Option<&'a RowBoundary<'a>>,
+    edge: Option<&'a RowBoundary<'a, D>>,
     lost: Mutex<Vec<Lost>>,
 }
 

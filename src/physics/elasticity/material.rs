@@ -10,6 +10,7 @@ use super::surface::Shares;
 use crate::discretization::{BondWeighting, BondWeights, Operator, Regions};
 use crate::execution::{BlockRow, Broken, Exec, Packs};
 use crate::family::{Body, Bond, BondStates};
+use crate::geometry::Images;
 use crate::physics::failure::CriticalStretch;
 use crate::solver::Drift;
 use crate::visit::Visitor;
@@ -54,7 +55,7 @@ pub trait Material<const D: usize, P: Packs>: Send + Sync {
         on: &mut On<'_, D>,
         state: &mut State<P>,
         step: Option<f64>,
-        edge: Option<&RowBoundary<'_>>,
+        edge: Option<&RowBoundary<'_, D>>,
     );
     /// Fills the force density from what the first pass left.
     fn second_pass(&mut self, _on: &mut On<'_, D>, _state: &mut State<P>) {}
@@ -154,8 +155,10 @@ pub trait Material<const D: usize, P: Packs>: Send + Sync {
 }
 
 /// Where bonds end at points with a row, which stands for unbroken bonds: such bonds do not break, and are told of.
-pub struct RowBoundary<'a> {
+pub struct RowBoundary<'a, const D: usize> {
     pub regions: &'a Regions,
+    /// An image is what its source is.
+    pub images: Option<&'a Images<D>>,
     pub overstretched: Mutex<Overstretched>,
 }
 
@@ -168,10 +171,11 @@ pub struct Overstretched {
     pub held: Vec<u32>,
 }
 
-impl RowBoundary<'_> {
+impl<const D: usize> RowBoundary<'_, D> {
     /// Takes note of a bond; whether it may break.
     pub(super) fn may_break(&self, here: usize, there: usize) -> bool {
-        let free = !self.regions.has_row(here) && !self.regions.has_row(there);
+        let source = self.images.map_or(there, |images| images.source(there).0);
+        let free = !self.regions.has_row(here) && !self.regions.has_row(source);
         let mut list = self.overstretched.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let list = if free { &mut list.broken } else { &mut list.held };
         list.extend([here as u32, there as u32]);

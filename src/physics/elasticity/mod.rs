@@ -8,6 +8,7 @@ pub mod bonds;
 pub mod density;
 pub mod discrete;
 pub mod hybrid;
+mod images;
 mod kernels;
 pub mod laws;
 pub mod linear_solid;
@@ -31,7 +32,7 @@ use crate::discretization::Operator;
 use crate::execution::{Broken, Exec, Packs};
 use crate::family::{Body, BondStates, Families};
 use crate::field::{Double, Field, Number, Precision, Values, components, embed};
-use crate::geometry::{Arrangement, Crack};
+use crate::geometry::{Arrangement, Crack, Images};
 use crate::parallel;
 use crate::physics::failure::CriticalStretch;
 use crate::solver::Drift;
@@ -123,9 +124,13 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         elasticity
     }
 
-    /// Breaks the bonds that cross a pre-crack; how many, both directions counted. `tolerance`, m: what counts as touching.
+    /// Breaks the bonds that cross a pre-crack or one of its images; how many, both directions counted. `tolerance`, m: what
+    /// counts as touching.
     pub fn cut(&mut self, crack: &Crack<D>, tolerance: f64) -> u64 {
-        let cut = self.state.states.cut(&self.body, crack, tolerance);
+        let mut cut = self.state.states.cut(&self.body, crack, tolerance);
+        for image in self.body.cloud.images.iter().flat_map(|images| images.of_crack(crack)) {
+            cut += self.state.states.cut(&self.body, &image, tolerance);
+        }
         self.n_cut += cut;
         cut
     }
@@ -148,8 +153,10 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
     /// Strain energy density by slot, J/m³.
     pub fn energy_density(&mut self) -> Vec<P::Field> {
         let mut density = vec![P::Field::default(); self.body.cloud.n_slots()];
-        let (material, mut on, state) = self.parts();
-        material.energy_density(&mut on, &state.states, components::<D, _>(&state.displacement), &mut density);
+        self.with_images(|body| {
+            let (material, mut on, state) = body.parts();
+            material.energy_density(&mut on, &state.states, components::<D, _>(&state.displacement), &mut density);
+        });
         density
     }
 
@@ -244,18 +251,22 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
     }
 
     fn evaluate(&mut self) {
-        let (material, mut on, state) = self.parts();
-        material.evaluate(&mut on, state);
+        self.with_images(|body| {
+            let (material, mut on, state) = body.parts();
+            material.evaluate(&mut on, state);
+        });
     }
 
     fn evolve(&mut self, dt: f64) {
-        let (material, mut on, state) = self.parts();
-        material.evolve(&mut on, state, dt);
+        self.with_images(|body| {
+            let (material, mut on, state) = body.parts();
+            material.evolve(&mut on, state, dt);
+        });
     }
 
     fn drift_and_evolve(&mut self, drift: &Drift, dt: f64) -> Option<f64> {
-        if !self.density.is_same() {
-            // The pass of a drift knows one inertia.
+        // The pass of a drift knows one inertia, and images have their values only when all points have drifted.
+        if !self.density.is_same() || self.body.cloud.images.is_some() {
             return None;
         }
         let (material, mut on, state) = self.parts();
@@ -498,6 +509,7 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
             + size_of_val(&cloud.slots[..])
             + self.density.memory()
             + self.materials.len();
+        let images = cloud.images.as_ref().map_or(0, Images::memory);
         let classes = self.failure.as_ref().map_or(0, CriticalStretch::memory);
         let points = match &cloud.arrangement {
             Arrangement::Lattice(_) => 0,
@@ -514,7 +526,7 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
             }
         };
         let bonds = size_of_val(self.state.states.words()) + self.operator.memory();
-        fields + classes + points + families + bonds + self.material.memory()
+        fields + images + classes + points + families + bonds + self.material.memory()
     }
 }
 

@@ -3,8 +3,9 @@
 use std::sync::atomic::AtomicU64;
 
 use super::Elasticity;
-use crate::execution::{Broken, Packs};
+use crate::execution::{BlockRow, Broken, Packs};
 use crate::field::{Number, components, components_mut};
+use crate::geometry::Images;
 use crate::physics::{Points, Tangent};
 use crate::solver::linear::{BlockJacobi, Layout, LinearError, Preconditioner, Sparse, vector};
 
@@ -26,11 +27,39 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
     }
 
     fn break_where(&mut self, u: &[f64], limit: f64, largest: &AtomicU64) -> Broken {
-        let mut scratch = vec![0.0; u.len()];
+        let (mut scratch, imaged) = (vec![0.0; u.len()], self.imaged(u));
+        let u = imaged.as_deref().unwrap_or(u);
         let (material, mut on, state) = self.parts();
         let (u, force) = (components::<D, _>(u), components_mut::<D, _>(&mut scratch));
         material.break_beyond(&mut on, &mut state.states, u, force, limit, largest)
     }
+}
+
+/// Puts the bonds of a point to images on their sources, which move the images, and gives what is left to the point itself.
+fn fold<const D: usize>(images: &Images<D>, here: usize, row: &mut BlockRow<D>) -> [[f64; D]; D] {
+    let mut own = [[0.0; D]; D];
+    let mut folded: BlockRow<D> = Vec::with_capacity(row.len());
+    for (there, mut block) in std::mem::take(row) {
+        let (source, signs) = images.source(there as usize);
+        for c in 0..D {
+            for d in 0..D {
+                own[c][d] += block[c][d];
+                block[c][d] *= signs[d];
+                if source == here {
+                    own[c][d] -= block[c][d];
+                }
+            }
+        }
+        if source != here {
+            folded.push((source as u32, block));
+        }
+    }
+    folded.sort_by_key(|(there, _)| *there);
+    for bonds in folded.chunk_by(|a, b| a.0 == b.0) {
+        let sum = |c: usize, d: usize| bonds.iter().map(|(_, block)| block[c][d]).sum();
+        row.push((bonds[0].0, std::array::from_fn(|c| std::array::from_fn(|d| sum(c, d)))));
+    }
+    own
 }
 
 impl<const D: usize, P: Packs> Tangent for Elasticity<D, P> {
@@ -47,6 +76,8 @@ impl<const D: usize, P: Packs> Tangent for Elasticity<D, P> {
     }
 
     fn forces(&mut self, u: &[f64], force: &mut [f64]) {
+        let imaged = self.imaged(u);
+        let u = imaged.as_deref().unwrap_or(u);
         let (material, mut on, state) = self.parts();
         let output = components_mut::<D, _>(&mut *force);
         material.force_in_double(&mut on, &state.states, components::<D, _>(u), output);
@@ -88,11 +119,17 @@ impl<const D: usize, P: Packs> Tangent for Elasticity<D, P> {
 
     fn assemble(&mut self, u: &[f64], free: &dyn Fn(usize) -> bool) -> Sparse {
         let (cloud, n) = (&self.body.cloud, self.body.cloud.n_slots());
-        let u = components::<D, _>(u);
-        let bonds = self
+        let imaged = self.imaged(u);
+        let u = components::<D, _>(imaged.as_deref().unwrap_or(u));
+        let mut bonds = self
             .material
             .stiffness(&self.body, &self.operator.weights, &self.state.states, u)
             .expect("checks have refused matrices of materials that have none by bonds");
+        // What a point is pulled by at its own displacement: of all its bonds, less what its own images do.
+        let own: Option<Vec<[[f64; D]; D]>> = cloud
+            .images
+            .as_ref()
+            .map(|images| bonds.iter_mut().enumerate().map(|(here, row)| fold(images, here, row)).collect());
         let (mut starts, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
         for c in 0..D {
             for (here, bonds) in bonds.iter().enumerate() {
@@ -100,7 +137,10 @@ impl<const D: usize, P: Packs> Tangent for Elasticity<D, P> {
                     let volume = cloud.volume(here);
                     for d in 0..D {
                         // The point itself stands among its neighbours, by its slot.
-                        let own = bonds.iter().map(|(_, block)| block[c][d]).sum::<f64>();
+                        let own = match &own {
+                            Some(own) => own[here][c][d],
+                            None => bonds.iter().map(|(_, block)| block[c][d]).sum::<f64>(),
+                        };
                         let before = bonds.partition_point(|(there, _)| (*there as usize) < here);
                         let entry = |(there, block): &(u32, [[f64; D]; D])| (*there as usize, -block[c][d]);
                         let others = bonds[..before].iter().map(entry);

@@ -69,6 +69,9 @@ impl CriticalStretch {
                 members[slot as usize] |= 1 << k;
             }
         }
+        if let Some(images) = &cloud.images {
+            images.copy(&mut members);
+        }
         let mut combinations = members.clone();
         combinations.sort_unstable();
         combinations.dedup();
