@@ -89,6 +89,10 @@ fn free_folder(case: &Path) -> PathBuf {
     folders.find(|folder| !folder.exists()).unwrap_or_default()
 }
 
+fn millimetres(position: &[f64]) -> String {
+    position.iter().map(|x| format!("{:.3}", 1e3 * x)).collect::<Vec<_>>().join(", ")
+}
+
 fn summary(report: &Report, folder: &Path) {
     let e = &report.energy;
     say!("{} after {} steps, t = {:.6e} s", report.status, report.steps, report.end_time);
@@ -101,11 +105,16 @@ fn summary(report: &Report, folder: &Path) {
         report.energy_imbalance
     );
     say!("broken bonds: {}; damaged points: {}", report.broken_bonds, report.damaged_points);
+    if let Some(most) = &report.largest_stretch_ratio {
+        say!(
+            "largest stretch of a whole bond: {:.3} of its critical stretch, at ({}) mm and t = {:.4e} s",
+            most.value,
+            millimetres(&most.position),
+            most.time
+        );
+    }
     if let Some(tip) = &report.crack_tip {
-        let place = tip
-            .position
-            .as_ref()
-            .map_or("none".into(), |x| x.iter().map(|x| format!("{:.3}", 1e3 * x)).collect::<Vec<_>>().join(", "));
+        let place = tip.position.as_ref().map_or("none".into(), |x| millimetres(x));
         say!(
             "crack tip: ({place}) mm; largest speed {:.0} m/s (Rayleigh speed {:.0} m/s)",
             tip.largest_speed,

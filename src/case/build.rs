@@ -45,7 +45,7 @@ use crate::solver::statics::Method;
 use crate::solver::{Clock, RungeKutta, Solver, Statics, VelocityVerlet};
 use conditions::motion_name;
 pub use geometry::available_memory;
-use outputs::{names, schedule, style, tip_window};
+use outputs::{force_on_set, force_through_cut, names, schedule, style, tip_window};
 
 /// How a case is to be run, beside what it says itself.
 #[derive(Debug, Clone, Default)]
@@ -217,6 +217,10 @@ impl<const D: usize> Builder<'_, D> {
         };
         let material = self.law().material::<D, P>(&moduli, &body, &operator.weights);
         let mut elasticity = Elasticity::new(body, operator, material, parameters.density, failure);
+        if hypothesis == Hypothesis::PlaneStrain {
+            let own = solid.and(parameters.poisson);
+            elasticity.out_of_plane = own.or(hypothesis.poisson()).unwrap_or(0.0);
+        }
         if settings.is_some_and(|settings| settings.rescale) {
             hybrid::rescale(&mut elasticity, &scaling);
         }
@@ -245,6 +249,7 @@ impl<const D: usize> Builder<'_, D> {
                 self.load(k, load, &body.cloud, shape.as_ref(), &slots, &mut terms)?;
             }
         }
+        self.sets_of_outputs(&elasticity.body.cloud)?;
         let bar_speed = (parameters.young / parameters.density).sqrt();
         if let Some(settings) = settings {
             elasticity = self.hybridise(settings, elasticity, solid, &scaling, horizon / bar_speed)?;
@@ -339,6 +344,8 @@ impl<const D: usize> Builder<'_, D> {
                     let schedule = Schedule::Steps(probe.every_steps);
                     outputs.push(Written { schedule, writer: Box::new(Probe::new(path, at, fields)) });
                 }
+                Output::Force(force) => outputs.push(force_on_set(force, folder)),
+                Output::Cut(cut) => outputs.push(force_through_cut(cut, folder)),
                 Output::CrackTip(t) => {
                     let mut along = [0.0; 3];
                     along[..D].copy_from_slice(&t.along);
