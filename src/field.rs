@@ -189,6 +189,64 @@ pub enum Values {
     Scalar(Vec<f64>),
     /// Three components a point, zeros beyond the dimension.
     Vector(Vec<[f64; 3]>),
+    /// A symmetric tensor a point: xx yy zz xy yz xz, the order of VTK.
+    Tensor(Vec<[f64; 6]>),
+    /// The three principal values of a tensor, the largest first.
+    Principal(Vec<[f64; 3]>),
+}
+
+/// Which of the [`Values`] a field has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    Scalar,
+    Vector,
+    Tensor,
+    Principal,
+}
+
+/// The components of a symmetric tensor, in the order that they are stored in.
+pub const TENSOR: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
+
+impl Kind {
+    /// The names of the components that there are in a dimension, by their number; none of a number. A tensor has zz in 2D
+    /// too.
+    pub fn components(self, dimension: usize) -> &'static [&'static str] {
+        match self {
+            Kind::Scalar => &[],
+            Kind::Vector => &["x", "y", "z"][..dimension],
+            Kind::Tensor => &TENSOR[..[1, 4, 6][dimension - 1]],
+            Kind::Principal => &["1", "2", "3"],
+        }
+    }
+}
+
+impl Values {
+    pub fn kind(&self) -> Kind {
+        match self {
+            Values::Scalar(_) => Kind::Scalar,
+            Values::Vector(_) => Kind::Vector,
+            Values::Tensor(_) => Kind::Tensor,
+            Values::Principal(_) => Kind::Principal,
+        }
+    }
+
+    /// How many numbers they are.
+    pub fn numbers(&self) -> usize {
+        match self {
+            Values::Scalar(values) => values.len(),
+            Values::Vector(values) | Values::Principal(values) => 3 * values.len(),
+            Values::Tensor(values) => 6 * values.len(),
+        }
+    }
+
+    /// The numbers of one point, one of each component that is stored.
+    pub fn of(&self, point: usize) -> &[f64] {
+        match self {
+            Values::Scalar(values) => std::slice::from_ref(&values[point]),
+            Values::Vector(values) | Values::Principal(values) => &values[point],
+            Values::Tensor(values) => &values[point],
+        }
+    }
 }
 
 /// A named field at the points of a body, in point order, with its SI unit (`""` for none).
@@ -205,6 +263,8 @@ impl Field {
         let values = match &self.values {
             Values::Scalar(values) => Values::Scalar(vec![values[point]]),
             Values::Vector(values) => Values::Vector(vec![values[point]]),
+            Values::Tensor(values) => Values::Tensor(vec![values[point]]),
+            Values::Principal(values) => Values::Principal(vec![values[point]]),
         };
         Field { values, ..*self }
     }

@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::say;
 
-/// Shows step, time, rate, time left, imbalance and, where they can, broken bonds.
+/// Shows step, time, rate, time left, imbalance and, where bonds can break, how many have and how near the others are to it.
 pub struct Line {
     bar: Option<ProgressBar>,
     quiet: bool,
@@ -68,8 +68,9 @@ fn text(p: &Progress) -> String {
             p.step, p.n_steps, p.time
         );
     }
+    let stretched = p.stretch_ratio.map_or(String::new(), |ratio| format!("  stretch {ratio:.2} of critical"));
     format!(
-        "step {}/{}  t {:.4e} s  {:.0} steps/s  {} left  imbalance {:.1e}{broken}",
+        "step {}/{}  t {:.4e} s  {:.0} steps/s  {} left  imbalance {:.1e}{broken}{stretched}",
         p.step,
         p.n_steps,
         p.time,

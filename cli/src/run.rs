@@ -91,6 +91,10 @@ fn free_folder(case: &Path) -> PathBuf {
     folders.find(|folder| !folder.exists()).unwrap_or_default()
 }
 
+fn millimetres(position: &[f64]) -> String {
+    position.iter().map(|x| format!("{:.3}", 1e3 * x)).collect::<Vec<_>>().join(", ")
+}
+
 fn summary(report: &Report, folder: &Path) {
     say!("{} after {} steps, t = {:.6e} s", report.status, report.steps, report.end_time);
     if let (Some(e), Some(imbalance)) = (&report.energy, report.energy_imbalance) {
@@ -105,6 +109,14 @@ fn summary(report: &Report, folder: &Path) {
     if let (Some(broken), Some(damaged)) = (report.broken_bonds, report.damaged_points) {
         say!("broken bonds: {broken}; damaged points: {damaged}");
     }
+    if let Some(most) = &report.largest_stretch_ratio {
+        say!(
+            "largest stretch of a whole bond: {:.3} of its critical stretch, at ({}) mm and t = {:.4e} s",
+            most.value,
+            millimetres(&most.position),
+            most.time
+        );
+    }
     if let Some(diffusion) = &report.diffusion {
         let book = |name: &str| report.books.get(name).and_then(|value| value.as_f64()).unwrap_or(f64::NAN);
         say!(
@@ -115,10 +127,7 @@ fn summary(report: &Report, folder: &Path) {
         );
     }
     if let Some(tip) = &report.crack_tip {
-        let place = tip
-            .position
-            .as_ref()
-            .map_or("none".into(), |x| x.iter().map(|x| format!("{:.3}", 1e3 * x)).collect::<Vec<_>>().join(", "));
+        let place = tip.position.as_ref().map_or("none".into(), |x| millimetres(x));
         say!(
             "crack tip: ({place}) mm; largest speed {:.0} m/s (Rayleigh speed {:.0} m/s)",
             tip.largest_speed,

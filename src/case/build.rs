@@ -48,7 +48,7 @@ use crate::solver::statics::Method;
 use crate::solver::{Clock, ForwardEuler, RungeKutta, Solver, Statics, VelocityVerlet};
 pub use geometry::available_memory;
 use materials::Values;
-use outputs::{names, schedule, style, tip_window};
+use outputs::{force_on_set, force_through_cut, names, schedule, style, tip_window};
 
 /// How a case is to be run, beside what it says itself.
 #[derive(Debug, Clone, Default)]
@@ -251,6 +251,11 @@ impl<const D: usize> Builder<'_, D> {
         }
         let mut elasticity = Elasticity::new(body, operator, material, reference.density, failure);
         elasticity.density = density;
+        if hypothesis == Hypothesis::PlaneStrain {
+            let typical = composition.as_ref().map_or(std::slice::from_ref(&reference), |found| &found.typical[..]);
+            let ratio = |values: &Values| solid.map(|_| values.poisson).or(hypothesis.poisson()).unwrap_or(0.0);
+            elasticity.out_of_plane = typical.iter().map(ratio).collect();
+        }
         if let Some(composition) = &composition {
             elasticity.materials.clone_from(&composition.material);
         }
@@ -280,6 +285,7 @@ impl<const D: usize> Builder<'_, D> {
                 self.load(k, load, &body.cloud, shape.as_ref(), &slots, &mut terms)?;
             }
         }
+        self.sets_of_outputs(&elasticity.body.cloud)?;
         let materials = self.summaries(&mut elasticity, composition.as_ref(), &reference, hypothesis);
         // A crack is no faster than in the fastest material, and the slowest needs the longest τ.
         let speeds = || materials.iter().map(|material| material.bar_speed);
@@ -377,6 +383,8 @@ impl<const D: usize> Builder<'_, D> {
                     let schedule = Schedule::Steps(probe.every_steps);
                     outputs.push(Written { schedule, writer: Box::new(Probe::new(path, at, fields)) });
                 }
+                Output::Force(force) => outputs.push(force_on_set(force, folder)),
+                Output::Cut(cut) => outputs.push(force_through_cut(cut, folder)),
                 Output::CrackTip(t) => {
                     let mut along = [0.0; 3];
                     along[..D].copy_from_slice(&t.along);

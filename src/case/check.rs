@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 
 use super::diagnostics::Diagnostic;
 use super::model::{
-    Case, Crack, CriticalStretch, FailurePair, Hybrid, Law, LinearSolver, Load, Motion, Output, Plane, Region, Scheme,
-    Shape, Solver, SurfaceCorrection,
+    Case, Crack, CriticalStretch, FailurePair, FieldName, Hybrid, Law, LinearSolver, Load, Motion, Output, Plane,
+    Region, Scheme, Shape, Solver, SurfaceCorrection,
 };
 use super::read::{Located, Source};
 use crate::expression::nearest;
@@ -140,7 +140,7 @@ impl Checker<'_> {
         }
         self.images(case);
         self.solvers(case);
-        self.outputs(case);
+        self.outputs(case, imported, &mut used);
         // Next to a mistake, such as a misspelt name, it would be an echo.
         for name in case.sets.keys().filter(|_| self.list.is_empty()).cloned().collect::<Vec<_>>() {
             if !used.contains(name.as_str()) {
@@ -596,8 +596,46 @@ impl Checker<'_> {
         self.error(path, format!("no set has this name; sets: {}", names.join(", ")), &help);
     }
 
-    fn outputs(&mut self, case: &Case) {
-        let mut probes: Vec<(String, usize)> = Vec::new();
+    /// The number of a component of a field.
+    fn component_of(&mut self, field: &FieldName, component: usize, dimension: usize, path: &str) {
+        let (path, name) = (format!("{path}.component"), field.name());
+        let known = field.kind().components(dimension);
+        if known.is_empty() {
+            self.error(&path, format!("`{name}` is a number, which has no components"), "remove the key");
+        } else if component >= known.len() {
+            let list: Vec<String> = known.iter().enumerate().map(|(k, name)| format!("{k} is {name}")).collect();
+            let message = format!("there is no component {component} of `{name}` in {dimension}D");
+            self.error(&path, message, &list.join(", "));
+        }
+    }
+
+    /// The place that moments are about.
+    fn about(&mut self, about: Option<&[f64]>, dimension: usize, path: &str) {
+        let Some(about) = about else { return };
+        let path = format!("{path}.about");
+        if dimension == 1 {
+            self.error(&path, "in 1D forces have no moments", "remove the key");
+        } else {
+            self.vector(about, dimension, &path);
+        }
+    }
+
+    /// The name of a table, which becomes part of that of its file. `tables`: kind, name and place of those before.
+    fn table_name<'a>(&mut self, kind: &'a str, name: &str, k: usize, tables: &mut Vec<(&'a str, String, usize)>) {
+        let path = format!("output[{k}].{kind}.name");
+        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
+            let message = format!("a {kind}'s name becomes a file name: letters, digits, `_` and `-` only");
+            self.error(&path, message, "");
+        }
+        let folded = name.to_lowercase();
+        if let Some((.., first)) = tables.iter().find(|(other, taken, _)| *other == kind && *taken == folded) {
+            self.error(&path, format!("output[{first}] has this name already (capitals do not count)"), "");
+        }
+        tables.push((kind, folded, k));
+    }
+
+    fn outputs<'a>(&mut self, case: &'a Case, imported: bool, used: &mut BTreeSet<&'a str>) {
+        let mut tables: Vec<(&str, String, usize)> = Vec::new();
         let (mut histories, mut tips) = (0, 0);
         for (k, output) in case.output.iter().enumerate() {
             let path = format!("output[{k}]");
@@ -620,7 +658,7 @@ impl Checker<'_> {
                         self.error(&format!("{path}.range"), "the first end must be below the second", "");
                     }
                     if let Some(component) = picture.component {
-                        self.component(component, case.case.dimension, &format!("{path}.component"));
+                        self.component_of(&picture.field, component, case.case.dimension, &path);
                     }
                 }
                 Output::History(_) => {
@@ -631,18 +669,28 @@ impl Checker<'_> {
                 }
                 Output::Probe(probe) => {
                     self.vector(&probe.at, case.case.dimension, &format!("{path}.probe.at"));
-                    let plain = !probe.name.is_empty()
-                        && probe.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
-                    if !plain {
-                        let message = "a probe's name becomes a file name: letters, digits, `_` and `-` only";
-                        self.error(&format!("{path}.probe.name"), message, "");
+                    self.table_name("probe", &probe.name, k, &mut tables);
+                }
+                Output::Force(force) => {
+                    let path = format!("{path}.force");
+                    self.set_name(&force.on, case, imported, &format!("{path}.on"), used);
+                    self.about(force.about.as_deref(), case.case.dimension, &path);
+                    self.table_name("force", &force.name, k, &mut tables);
+                }
+                Output::Cut(cut) => {
+                    let path = format!("{path}.cut");
+                    self.vector(&cut.point, case.case.dimension, &format!("{path}.point"));
+                    self.vector(&cut.normal, case.case.dimension, &format!("{path}.normal"));
+                    if cut.normal.iter().all(|&n| n == 0.0) {
+                        let message = "the zero vector is no direction";
+                        self.error(
+                            &format!("{path}.normal"),
+                            message,
+                            "give the direction across the cut, of any length",
+                        );
                     }
-                    let folded = probe.name.to_lowercase();
-                    if let Some((_, first)) = probes.iter().find(|(name, _)| *name == folded) {
-                        let message = format!("output[{first}] has this name already (capitals do not count)");
-                        self.error(&format!("{path}.probe.name"), message, "");
-                    }
-                    probes.push((folded, k));
+                    self.about(cut.about.as_deref(), case.case.dimension, &path);
+                    self.table_name("cut", &cut.name, k, &mut tables);
                 }
                 Output::CrackTip(tip) => {
                     tips += 1;

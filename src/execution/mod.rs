@@ -50,6 +50,7 @@ macro_rules! compiled {
 mod blocks;
 mod cloud;
 mod collocation;
+mod each_bond;
 pub mod gradients;
 mod lattice;
 pub mod machine;

@@ -111,6 +111,8 @@ pub trait BondLaw<const D: usize>: Copy + Send + Sync + 'static {
     fn strain<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D]) -> L;
     /// The strain of a bond at stretch s.
     fn strain_at(&self, stretch: f64) -> f64;
+    /// The stretch of a bond at a strain: the inverse of [`BondLaw::strain_at`].
+    fn stretch_at(&self, strain: f64) -> f64;
     /// `sum` and the force density on x from x′ (N/m³ in 3D, weighted).
     fn force<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D];
     /// Elastic energy density of the bond, weighted: half of it belongs to each end.

@@ -38,6 +38,8 @@ impl Writer for Frames {
             .map(|field| match &field.values {
                 Values::Scalar(v) => (field.name, FieldData::Scalar(v)),
                 Values::Vector(v) => (field.name, FieldData::Vector(v)),
+                Values::Tensor(v) => (field.name, FieldData::Tensor(v)),
+                Values::Principal(v) => (field.name, FieldData::Principal(v)),
             })
             .collect();
         let path = self.folder.join(&name);

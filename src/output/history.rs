@@ -1,4 +1,4 @@
-//! The history of a run: energies, momenta, broken bonds, crack tip and reactions, a row at a time.
+//! The history of a run: energies, momenta, broken bonds, crack tip, reactions and the most stretched bond, a row at a time.
 //!
 //! The rows are made on the stepping thread, which alone has the forces; what puts them into the file is a
 //! [`Table`] like any other.
@@ -10,7 +10,7 @@ use super::snapshot::FieldCache;
 use super::source::Source;
 use super::table::Table;
 use crate::field::Values;
-use crate::physics::Balance;
+use crate::physics::{Balance, StretchedBond};
 use crate::solver::Clock;
 
 /// Makes the rows of `history.csv` and keeps the extremes that the report needs.
@@ -20,6 +20,10 @@ pub struct History {
     last_step: Option<u64>,
     pub tip: Option<CrackTip>,
     pub balance: Balance,
+    /// The stretch ratio of the last row; None where no bond can break.
+    pub stretch_ratio: Option<f64>,
+    /// The largest of all rows, and when it was, s; None until a bond was stretched.
+    pub most_stretched: Option<(StretchedBond, f64)>,
     largest_defect: f64,
     largest_scale: f64,
     largest_momentum_defect: f64,
@@ -34,6 +38,8 @@ impl History {
             last_step: None,
             tip,
             balance: Balance::default(),
+            stretch_ratio: None,
+            most_stretched: None,
             largest_defect: 0.0,
             largest_scale: 0.0,
             largest_momentum_defect: 0.0,
@@ -69,6 +75,9 @@ impl History {
             columns.extend(names.map(String::from));
         }
         columns.extend(source.reactions().iter().map(|(name, _)| format!("reaction_{name}")));
+        if source.facts().physics.elastic().is_some_and(|elastic| elastic.critical_stretch.is_some()) {
+            columns.push("largest_stretch_ratio".into());
+        }
         Table::new(&self.path, columns)
     }
 
@@ -106,6 +115,21 @@ impl History {
             row.extend([work.standard[0], work.bonds as f64, work.nodes as f64, b.momentum_defect]);
         }
         row.extend(look.source.reactions().iter().map(|(_, value)| value));
+        if look.source.facts().physics.elastic().is_some_and(|elastic| elastic.critical_stretch.is_some()) {
+            row.push(self.look_at_stretches(look.source, clock.time()));
+        }
         Some(row)
+    }
+
+    /// The largest stretch ratio now, at time `t`; 0 where no bond is stretched.
+    fn look_at_stretches(&mut self, source: &mut dyn Source, t: f64) -> f64 {
+        let now = source.most_stretched();
+        let ratio = now.map_or(0.0, |bond| bond.ratio);
+        self.stretch_ratio = Some(ratio);
+        let before = self.most_stretched.map_or(0.0, |(bond, _)| bond.ratio);
+        if let Some(bond) = now.filter(|bond| bond.ratio > before) {
+            self.most_stretched = Some((bond, t));
+        }
+        ratio
     }
 }

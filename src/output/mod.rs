@@ -9,6 +9,7 @@ pub mod history;
 pub mod pictures;
 pub mod probe;
 pub mod report;
+pub mod resultants;
 pub mod schedule;
 pub mod snapshot;
 pub mod source;

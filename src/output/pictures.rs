@@ -22,8 +22,8 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    fn path(&self, step: u64) -> PathBuf {
-        let component = self.component.map_or("", |c| ["_x", "_y", "_z"][c]);
+    fn path(&self, component: Option<&str>, step: u64) -> PathBuf {
+        let component = component.map_or(String::new(), |name| format!("_{name}"));
         self.folder.join("pictures").join(format!("{}{component}_{step:08}.png", self.field))
     }
 }
@@ -40,14 +40,16 @@ impl Writer for Pictures {
     fn write(&mut self, snapshot: &Snapshot) -> Result<()> {
         let Some(field) = snapshot.field(self.field) else { return Ok(()) };
         let unit = if field.unit.is_empty() { "-" } else { field.unit };
-        let axis = self.component.map_or(String::new(), |c| format!(" {}", ["x", "y", "z"][c]));
+        let names = field.values.kind().components(snapshot.points.facts.dimension);
+        let component = self.component.and_then(|c| names.get(c).copied());
+        let axis = component.map_or(String::new(), |name| format!(" {name}"));
         let label = format!("{}{axis} [{unit}]", field.name.replace('_', " "));
-        let of_vectors;
+        let of_components;
         let mut values: &[f64] = match &field.values {
             Values::Scalar(values) => values,
-            Values::Vector(vectors) => {
-                of_vectors = component_of(vectors, self.component);
-                &of_vectors
+            others => {
+                of_components = component_of(others, self.component);
+                &of_components
             }
         };
         let points = &*snapshot.points;
@@ -67,7 +69,7 @@ impl Writer for Pictures {
         let cloud = CloudView { positions: &positions, sizes, values, dimension: points.facts.dimension };
         let picture = Picture { label, ..self.style.clone() };
         let image = draw(&picture, &cloud, Some(snapshot.clock.time()));
-        let path = self.path(snapshot.clock.step);
+        let path = self.path(component, snapshot.clock.step);
         if let Some(parent) = path.parent() {
             std::fs::create_dir_all(parent).map_err(|e| Error::io(parent, e))?;
         }

@@ -6,7 +6,7 @@ use super::snapshot::{FieldRequest, Snapshot};
 use super::table::Table;
 use super::writer::Writer;
 use crate::error::Result;
-use crate::field::Values;
+use crate::field::Kind;
 
 /// Writes `probe_<name>.csv` with the fields of the point nearest to a place.
 pub struct Probe {
@@ -29,23 +29,22 @@ impl Writer for Probe {
     }
 
     fn write(&mut self, snapshot: &Snapshot) -> Result<()> {
-        let axes = &["x", "y", "z"][..snapshot.points.facts.dimension];
+        let dimension = snapshot.points.facts.dimension;
         let table = self.table.get_or_insert_with(|| {
             let mut columns = vec!["step".to_string(), "time".into()];
             for field in &snapshot.fields {
-                match field.values {
-                    Values::Scalar(_) => columns.push(field.name.into()),
-                    Values::Vector(_) => columns.extend(axes.iter().map(|a| format!("{}_{a}", field.name))),
+                match field.values.kind() {
+                    Kind::Scalar => columns.push(field.name.into()),
+                    kind => columns.extend(kind.components(dimension).iter().map(|c| format!("{}_{c}", field.name))),
                 }
             }
             Table::new(&self.path, columns)
         });
         let mut row = vec![snapshot.clock.step as f64, snapshot.clock.time()];
         for field in &snapshot.fields {
-            match &field.values {
-                Values::Scalar(v) => row.extend(v),
-                Values::Vector(v) => row.extend(v.iter().flat_map(|v| &v[..axes.len()])),
-            }
+            // Components beyond the dimension stand last.
+            let components = field.values.kind().components(dimension).len().max(1);
+            row.extend(&field.values.of(0)[..components]);
         }
         table.row(&row)
     }

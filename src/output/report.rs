@@ -56,6 +56,8 @@ pub struct Report {
     pub momentum_error: Option<f64>,
     /// Pairs broken since the start.
     pub broken_bonds: Option<u64>,
+    /// The largest stretch ratio of a whole bond in any row of the history; null if bonds never break or none was stretched.
+    pub largest_stretch_ratio: Option<StretchRatio>,
     /// Points with φ > 0.35.
     pub damaged_points: Option<usize>,
     pub crack_tip: Option<Tip>,
@@ -109,6 +111,17 @@ pub struct Hybrid {
     /// Bonds that were visited, all evaluations together, and points of rows.
     pub bond_evaluations: u64,
     pub row_evaluations: u64,
+}
+
+/// How near a bond came to breaking.
+#[derive(Debug, Clone, Serialize, PartialEq)]
+pub struct StretchRatio {
+    /// Stretch over critical stretch.
+    pub value: f64,
+    /// The middle of the bond in the undeformed body, m.
+    pub position: Vec<f64>,
+    /// s
+    pub time: f64,
 }
 
 /// Where the time went. The first three follow each other; writing goes on beside them.

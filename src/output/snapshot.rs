@@ -4,7 +4,8 @@
 use std::sync::Arc;
 
 use super::source::{Points, Source};
-use crate::field::{Field, Values, difference, norm};
+use crate::field::{Field, difference, norm};
+use crate::physics::{ForceAndMoment, Resultant};
 use crate::solver::Clock;
 
 /// The fields that a writer wants to be handed.
@@ -15,17 +16,24 @@ pub struct FieldRequest {
     pub at: Option<[f64; 3]>,
     /// That point.
     point: Option<usize>,
+    /// A force on a part of the body.
+    resultant: Option<Resultant>,
 }
 
 impl FieldRequest {
     /// These fields at all points.
     pub fn everywhere(fields: Vec<&'static str>) -> Self {
-        FieldRequest { fields, at: None, point: None }
+        FieldRequest { fields, ..FieldRequest::default() }
     }
 
     /// These fields at the point nearest to a place, m.
     pub fn at(fields: Vec<&'static str>, at: [f64; 3]) -> Self {
-        FieldRequest { fields, at: Some(at), point: None }
+        FieldRequest { fields, at: Some(at), ..FieldRequest::default() }
+    }
+
+    /// No field, but a force on a part of the body.
+    pub fn resultant(of: Resultant) -> Self {
+        FieldRequest { resultant: Some(of), ..FieldRequest::default() }
     }
 
     /// Finds the place among the points of a body.
@@ -44,6 +52,8 @@ pub struct Snapshot {
     pub points: Arc<Points>,
     /// Those that the writer wants and the model has, in the writer's order.
     pub fields: Vec<Arc<Field>>,
+    /// The force that the writer wants, if any.
+    pub resultant: Option<ForceAndMoment>,
 }
 
 impl Snapshot {
@@ -53,13 +63,7 @@ impl Snapshot {
 
     /// How many numbers it holds.
     pub fn numbers(&self) -> usize {
-        self.fields
-            .iter()
-            .map(|field| match &field.values {
-                Values::Scalar(values) => values.len(),
-                Values::Vector(values) => 3 * values.len(),
-            })
-            .sum()
+        self.fields.iter().map(|field| field.values.numbers()).sum()
     }
 }
 
@@ -93,7 +97,8 @@ impl<'a> FieldCache<'a> {
             (_, None) => Vec::new(),
             (_, Some(point)) => wants.fields.iter().filter_map(|name| self.field_at(name, point)).collect(),
         };
-        Snapshot { clock: self.clock, points: self.source.points().clone(), fields }
+        let resultant = wants.resultant.as_ref().and_then(|of| self.source.resultant(of));
+        Snapshot { clock: self.clock, points: self.source.points().clone(), fields, resultant }
     }
 
     fn field_at(&mut self, name: &str, point: usize) -> Option<Arc<Field>> {

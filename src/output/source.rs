@@ -5,10 +5,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::field::{Field, Values};
+use crate::field::{Field, Values, norm};
 use crate::physics::elasticity::Work;
 use crate::physics::elasticity::surface::SurfaceEffect;
-use crate::physics::{Adapted, Balance, Column};
+use crate::physics::{Adapted, Balance, Column, ForceAndMoment, Resultant, StretchedBond};
 
 /// A model that outputs look at. Asking for a field may compute it, hence the `&mut`.
 pub trait Source {
@@ -38,6 +38,14 @@ pub trait Source {
     }
     /// What the hybrid scheme has to do; None in the standard scheme.
     fn hybrid(&self) -> Option<Work> {
+        None
+    }
+    /// A force on a part of the body; None where the physics has none.
+    fn resultant(&mut self, _of: &Resultant) -> Option<ForceAndMoment> {
+        None
+    }
+    /// The whole bond that is nearest to breaking; None where no bond is stretched, or none can break.
+    fn most_stretched(&mut self) -> Option<StretchedBond> {
         None
     }
     fn hash(&mut self) -> String;
@@ -208,18 +216,25 @@ pub fn moved(positions: &[[f64; 3]], displacement: Option<&Field>, factor: f64) 
     }
 }
 
-/// One component of a field, or the magnitude of a vector when none is named.
+/// One component of a field, or its magnitude when none is named.
 pub fn scalar(field: Field, component: Option<usize>) -> Vec<f64> {
     match field.values {
         Values::Scalar(values) => values,
-        Values::Vector(values) => component_of(&values, component),
+        values => component_of(&values, component),
     }
 }
 
-/// One component of vectors, or their magnitudes when none is named.
-pub fn component_of(values: &[[f64; 3]], component: Option<usize>) -> Vec<f64> {
-    match component {
-        Some(c) => values.par_iter().map(|v| v[c]).collect(),
-        None => values.par_iter().map(crate::field::norm).collect(),
+/// One component, or the magnitudes when none is named: |v| of vectors, √(a : a) of tensors.
+pub fn component_of(values: &Values, component: Option<usize>) -> Vec<f64> {
+    match (values, component) {
+        (Values::Scalar(values), _) => values.clone(),
+        (Values::Vector(values) | Values::Principal(values), Some(c)) => values.par_iter().map(|v| v[c]).collect(),
+        (Values::Vector(values) | Values::Principal(values), None) => values.par_iter().map(norm).collect(),
+        (Values::Tensor(values), Some(c)) => values.par_iter().map(|v| v[c]).collect(),
+        // Those off the diagonal stand for two each.
+        (Values::Tensor(values), None) => values
+            .par_iter()
+            .map(|[a, b, c, d, e, f]| norm(&[norm(&[*a, *b, *c]), 2f64.sqrt() * norm(&[*d, *e, *f])]))
+            .collect(),
     }
 }

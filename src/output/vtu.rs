@@ -20,11 +20,17 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 
+use crate::field::{Kind, TENSOR};
+
 /// The values of one field, one entry per point.
 #[derive(Clone, Copy, Debug)]
 pub enum FieldData<'a> {
     Scalar(&'a [f64]),
     Vector(&'a [[f64; 3]]),
+    /// Symmetric: xx yy zz xy yz xz.
+    Tensor(&'a [[f64; 6]]),
+    /// The principal values of a tensor.
+    Principal(&'a [[f64; 3]]),
     Integer(&'a [i64]),
 }
 
@@ -79,7 +85,8 @@ pub fn write_vtu(path: &Path, grid: &Grid, fields: &[(&str, FieldData<'_>)], tim
         .iter()
         .map(|(_, data)| match *data {
             FieldData::Scalar(values) => reals(values, precision),
-            FieldData::Vector(values) => reals(values.as_flattened(), precision),
+            FieldData::Vector(values) | FieldData::Principal(values) => reals(values.as_flattened(), precision),
+            FieldData::Tensor(values) => reals(values.as_flattened(), precision),
             FieldData::Integer(values) => integers(count, |i| values[i]),
         })
         .collect();
@@ -98,12 +105,19 @@ pub fn write_vtu(path: &Path, grid: &Grid, fields: &[(&str, FieldData<'_>)], tim
          <Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>"
     );
     for ((name, data), packed) in fields.iter().zip(&packed) {
-        let (kind, components) = match data {
-            FieldData::Scalar(_) => (precision.name(), 1),
-            FieldData::Vector(_) => (precision.name(), 3),
-            FieldData::Integer(_) => ("Int64", 1),
+        // Names of components only where they are not those that every reader gives them.
+        let (kind, components, names): (_, _, &[&str]) = match data {
+            FieldData::Scalar(_) => (precision.name(), 1, &[]),
+            FieldData::Vector(_) => (precision.name(), 3, &[]),
+            FieldData::Tensor(_) => (precision.name(), 6, &TENSOR),
+            FieldData::Principal(_) => (precision.name(), 3, Kind::Principal.components(3)),
+            FieldData::Integer(_) => ("Int64", 1, &[]),
         };
-        appended.push(&mut xml, &escaped(name), kind, components, packed);
+        let mut attributes = escaped(name).into_owned();
+        for (k, name) in names.iter().enumerate() {
+            let _ = write!(attributes, "\" ComponentName{k}=\"{name}");
+        }
+        appended.push(&mut xml, &attributes, kind, components, packed);
     }
     xml.push_str("</PointData>\n<Points>\n");
     appended.push(&mut xml, "Points", precision.name(), 3, &grid.points);
@@ -157,7 +171,8 @@ impl FieldData<'_> {
     fn len(&self) -> usize {
         match self {
             Self::Scalar(values) => values.len(),
-            Self::Vector(values) => values.len(),
+            Self::Vector(values) | Self::Principal(values) => values.len(),
+            Self::Tensor(values) => values.len(),
             Self::Integer(values) => values.len(),
         }
     }
@@ -325,10 +340,12 @@ mod tests {
             let path = folder.join("frame.vtu");
             let positions: Vec<_> = (0..count).map(|i| [i as f64, 0.1, -1e-300]).collect();
             let damage: Vec<_> = (0..count).map(|i| 1.0 / (i as f64 + 3.0)).collect();
+            let stresses: Vec<_> = (0..count).map(|i| [i as f64, 0.1, -1e-300, 3.0, 4.0, 5.0]).collect();
             let marks: Vec<_> = (0..count).map(|i| i as i64 - 7).collect();
             let fields = [
                 ("damage", FieldData::Scalar(&damage)),
                 ("mark", FieldData::Integer(&marks)),
+                ("stress", FieldData::Tensor(&stresses)),
                 ("velocity", FieldData::Vector(&positions)),
             ];
             write_vtu(&path, &Grid::new(&positions, Precision::Float64), &fields, 1e-6).unwrap();
@@ -336,6 +353,14 @@ mod tests {
             let real = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().unwrap());
             let read: Vec<f64> = array(&file, "damage").chunks(8).map(real).collect();
             assert_eq!(read, damage);
+            let read: Vec<f64> = array(&file, "stress").chunks(8).map(real).collect();
+            assert_eq!(read, stresses.as_flattened());
+            let head = String::from_utf8_lossy(&file[..file.len().min(4096)]).into_owned();
+            let tensor = head.lines().find(|line| line.contains("Name=\"stress\"")).unwrap();
+            assert!(tensor.contains("NumberOfComponents=\"6\""), "{tensor}");
+            for (k, name) in TENSOR.iter().enumerate() {
+                assert!(tensor.contains(&format!("ComponentName{k}=\"{name}\"")), "{tensor}");
+            }
             let read: Vec<f64> = array(&file, "Points").chunks(8).map(real).collect();
             assert_eq!(read, positions.as_flattened());
             assert_eq!(array(&file, "velocity"), array(&file, "Points"));

@@ -194,7 +194,7 @@ mod tests {
         };
         let points = Arc::new(Points { positions: Vec::new(), sizes: Vec::new(), facts });
         let fields = vec![Arc::new(Field { name: "damage", unit: "", values: Values::Scalar(vec![0.0; numbers]) })];
-        Snapshot { clock: Clock::at(step, 1.0), points, fields }
+        Snapshot { clock: Clock::at(step, 1.0), points, fields, resultant: None }
     }
 
     fn heavy(step: u64) -> Batch {

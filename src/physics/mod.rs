@@ -7,15 +7,17 @@
 pub mod diffusion;
 pub mod elasticity;
 pub mod failure;
+mod resultant;
 
 use std::ops::Range;
 
 pub use diffusion::Diffusion;
 pub use elasticity::Elasticity;
+pub use resultant::{ForceAndMoment, Resultant, StretchedBond};
 
 use crate::execution::Broken;
 use crate::family::{Body, BondStates};
-use crate::field::{Field, embed};
+use crate::field::{Field, Kind, embed};
 use crate::geometry::Arrangement;
 use crate::refinement::Remap;
 use crate::solver::Drift;
@@ -71,6 +73,14 @@ pub trait Physics: Send {
     /// What has broken so far.
     fn broken(&self) -> Broken {
         Broken::default()
+    }
+    /// A force on a part of the body; None where there are no forces.
+    fn resultant(&mut self, _of: &Resultant) -> Option<ForceAndMoment> {
+        None
+    }
+    /// The whole bond that is nearest to breaking; None where no bond is stretched, or none can break.
+    fn most_stretched(&mut self) -> Option<StretchedBond> {
+        None
     }
     /// Whether something inside the body takes energy while it moves.
     fn dissipates(&self) -> bool {
@@ -134,6 +144,7 @@ pub struct FieldInfo {
     /// SI; empty for none.
     pub unit: &'static str,
     pub about: &'static str,
+    pub kind: Kind,
 }
 
 /// The fields that cases may ask for, of one physics after another.

@@ -11,7 +11,9 @@ pub use model::Model;
 
 use crate::error::{Error, Result};
 use crate::output::history::History;
-use crate::output::report::{Diffusion, Energy, Hybrid, Refinement, Report, Tip, WallSeconds, peak_memory};
+use crate::output::report::{
+    Diffusion, Energy, Hybrid, Refinement, Report, StretchRatio, Tip, WallSeconds, peak_memory,
+};
 use crate::output::snapshot::FieldCache;
 use crate::output::source::{Points, Source};
 use crate::output::writer::{Output, ScheduledRequest};
@@ -90,6 +92,8 @@ pub struct Progress {
     pub imbalance: f64,
     /// None where nothing can break.
     pub broken_bonds: Option<u64>,
+    /// The largest stretch over critical stretch of a whole bond, at the last row of the history; None where none can break.
+    pub stretch_ratio: Option<f64>,
     pub seconds: f64,
     /// Iterations within a load step, and how far forces are out of balance there.
     pub within: Option<(usize, f64)>,
@@ -212,6 +216,7 @@ impl Simulation {
             time: self.clock.time(),
             imbalance: self.history.imbalance(),
             broken_bonds: self.model.facts().physics.elastic().map(|_| self.model.broken_pairs()),
+            stretch_ratio: self.history.stretch_ratio,
             seconds: begin.elapsed().as_secs_f64(),
             within: None,
         }
@@ -282,6 +287,11 @@ impl Simulation {
             energy_imbalance: elastic.map(|_| imbalance),
             momentum_error: elastic.map(|_| self.history.momentum_error()),
             broken_bonds: elastic.map(|_| self.model.broken_pairs()),
+            largest_stretch_ratio: self.history.most_stretched.map(|(bond, time)| StretchRatio {
+                value: bond.ratio,
+                position: bond.position[..facts.dimension].to_vec(),
+                time,
+            }),
             damaged_points: elastic.map(|_| damage.iter().filter(|&&d| d > 0.35).count()),
             crack_tip: self.history.tip.as_ref().map(|tip| Tip {
                 position: tip.position.map(|x| x[..facts.dimension].to_vec()),

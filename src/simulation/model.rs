@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::field::Field;
 use crate::output::source::{BodySummary, Points, Source};
 use crate::physics::elasticity::Work;
-use crate::physics::{Adapted, Balance, Column};
+use crate::physics::{Adapted, Balance, Column, ForceAndMoment, Resultant, StretchedBond};
 use crate::problem::Problem;
 use crate::solver::statics::LoadStep;
 use crate::solver::{Clock, Solver};
@@ -93,6 +93,12 @@ impl Source for Model {
     }
     fn hybrid(&self) -> Option<Work> {
         self.problem.physics.hybrid()
+    }
+    fn resultant(&mut self, of: &Resultant) -> Option<ForceAndMoment> {
+        self.problem.physics.resultant(of)
+    }
+    fn most_stretched(&mut self) -> Option<StretchedBond> {
+        self.problem.physics.most_stretched()
     }
     fn hash(&mut self) -> String {
         self.problem.hash()

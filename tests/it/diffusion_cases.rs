@@ -102,7 +102,7 @@ fn finished(mut simulation: Simulation) -> Simulation {
 fn concentration(simulation: &mut Simulation) -> Vec<f64> {
     match simulation.model.field("concentration").unwrap().values {
         Values::Scalar(values) => values,
-        Values::Vector(_) => panic!("a number a point"),
+        _ => panic!("a number a point"),
     }
 }
 

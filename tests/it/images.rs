@@ -40,6 +40,7 @@ fn vectors(simulation: &mut Simulation, name: &str) -> Vec<[f64; 3]> {
     match simulation.model.field(name).unwrap().values {
         Values::Vector(values) => values,
         Values::Scalar(values) => values.into_iter().map(|value| [value, 0.0, 0.0]).collect(),
+        _ => panic!("{name} is a tensor"),
     }
 }
 

@@ -44,6 +44,9 @@ impl<const D: usize> BondLaw<D> for Softening {
     fn strain_at(&self, stretch: f64) -> f64 {
         stretch
     }
+    fn stretch_at(&self, strain: f64) -> f64 {
+        strain
+    }
     #[inline(always)]
     fn remember<L: Lane>(&self, bond: &Bond<D, L>, strain: L) -> L {
         bond.memory.or_larger(strain)

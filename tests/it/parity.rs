@@ -360,6 +360,7 @@ fn a_run_does_not_depend_on_the_order_of_the_points() {
         let values = |model: &mut Simulation| match model.model.field(name).unwrap().values {
             Values::Scalar(values) => values.into_iter().map(|v| [v, 0.0, 0.0]).collect(),
             Values::Vector(values) => values,
+            others => panic!("{name}: {others:?}"),
         };
         let (a, b): (Vec<[f64; 3]>, _) = (values(&mut a), values(&mut b));
         let largest = a.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));

@@ -54,7 +54,7 @@ const BLOCK: &str = "block = { size = [0.02, 0.01, 0.01] }";
 fn vectors(simulation: &mut Simulation, field: &str) -> Vec<[f64; 3]> {
     match simulation.model.field(field).unwrap().values {
         Values::Vector(values) => values,
-        Values::Scalar(_) => panic!("a vector"),
+        _ => panic!("a vector"),
     }
 }
 

@@ -23,7 +23,7 @@ fn finished(mut simulation: Simulation) -> Simulation {
 fn vectors(simulation: &mut Simulation, name: &str) -> Vec<[f64; 3]> {
     match simulation.model.field(name).unwrap().values {
         Values::Vector(values) => values,
-        Values::Scalar(_) => panic!("a vector"),
+        _ => panic!("a vector"),
     }
 }
 

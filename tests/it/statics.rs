@@ -42,7 +42,7 @@ fn settled(mut simulation: Simulation) -> Result<Simulation> {
 fn displacement(simulation: &mut Simulation) -> Vec<[f64; 3]> {
     match simulation.model.field("displacement").unwrap().values {
         Values::Vector(values) => values,
-        Values::Scalar(_) => panic!("a vector"),
+        _ => panic!("a vector"),
     }
 }
 

@@ -1,12 +1,18 @@
 //! What a case writes, and when.
 
-use super::super::model::{self, FieldName};
+use std::path::{Path, PathBuf};
+
+use super::super::model::{self, FieldName, Output};
 use super::{Builder, DAMAGED, MANY_FILES};
 use crate::error::Result;
+use crate::geometry::Cloud;
 use crate::output::crack_tip::CrackTip;
 use crate::output::picture::{ColorMap, Picture, View};
+use crate::output::resultants::Resultants;
 use crate::output::schedule::Schedule;
 use crate::output::source::BodySummary;
+use crate::output::writer::Output as Written;
+use crate::physics::Resultant;
 
 impl<const D: usize> Builder<'_, D> {
     pub(super) fn files(&self, schedule: &Schedule, n_steps: u64, dt: f64, path: &str) -> Result<()> {
@@ -14,6 +20,16 @@ impl<const D: usize> Builder<'_, D> {
         if count > MANY_FILES && !self.options.many_files {
             let message = format!("this would write {count} files; at most {MANY_FILES} are written unasked");
             return Err(self.refuse(path, message, "write less often, or pass --many-files"));
+        }
+        Ok(())
+    }
+
+    /// Refuses outputs on sets that the body does not have.
+    pub(super) fn sets_of_outputs(&self, cloud: &Cloud<D>) -> Result<()> {
+        for (k, output) in self.case.value.output.iter().enumerate() {
+            if let Output::Force(force) = output {
+                self.slots(&force.on, cloud, &format!("output[{k}].force.on"))?;
+            }
         }
         Ok(())
     }
@@ -33,6 +49,26 @@ impl<const D: usize> Builder<'_, D> {
 /// s; None where nothing breaks.
 pub(super) fn tip_window(facts: &BodySummary) -> Option<f64> {
     facts.physics.elastic().map(|elastic| 20.0 * facts.horizon / elastic.bar_speed)
+}
+
+pub(super) fn force_on_set(force: &model::Force, folder: &Path) -> Written {
+    let of = Resultant::OnSet { set: force.on.clone(), about: force.about.as_deref().map(place) };
+    table_of(of, folder.join(format!("force_{}.csv", force.name)), force.every_steps)
+}
+
+pub(super) fn force_through_cut(cut: &model::Cut, folder: &Path) -> Written {
+    let (point, normal) = (place(&cut.point), place(&cut.normal));
+    let of = Resultant::ThroughCut { point, normal, about: cut.about.as_deref().map_or(point, place) };
+    table_of(of, folder.join(format!("cut_{}.csv", cut.name)), cut.every_steps)
+}
+
+fn table_of(of: Resultant, path: PathBuf, every_steps: u64) -> Written {
+    Written { schedule: Schedule::Steps(every_steps), writer: Box::new(Resultants::new(path, of)) }
+}
+
+/// With zeros beyond the dimension.
+fn place(x: &[f64]) -> [f64; 3] {
+    std::array::from_fn(|d| x.get(d).copied().unwrap_or(0.0))
 }
 
 pub(super) fn schedule(every: Option<f64>, every_steps: Option<u64>, at: &[f64]) -> Schedule {

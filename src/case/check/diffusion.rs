@@ -164,7 +164,7 @@ impl Checker<'_> {
                     let path = |i: usize| format!("output[{k}].{kind}.fields[{i}]");
                     fields.iter().enumerate().map(|(i, field)| (path(i), field.name())).collect()
                 }
-                Output::History(_) | Output::CrackTip(_) => Vec::new(),
+                Output::History(_) | Output::CrackTip(_) | Output::Force(_) | Output::Cut(_) => Vec::new(),
             };
             for (path, field) in asked.into_iter().filter(|(_, field)| !known.contains(field)) {
                 let message = format!("{name} has no field `{field}`; its fields: {}", known.join(", "));

@@ -7,6 +7,7 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::json;
 
+use crate::field::Kind;
 use crate::physics::all_fields;
 
 /// Something to write.
@@ -23,6 +24,10 @@ pub enum Output {
     Probe(Probe),
     /// The crack tip: the damaged point farthest along a direction.
     CrackTip(CrackTip),
+    /// The force on a set, internal forces and loads, and its moment, as a table.
+    Force(Force),
+    /// The force that bonds transmit through a plane, and its moment, as a table.
+    Cut(Cut),
 }
 
 /// VTU frames.
@@ -47,6 +52,11 @@ pub struct FieldName(&'static str);
 impl FieldName {
     pub fn name(&self) -> &'static str {
         self.0
+    }
+
+    /// What a value of the field is.
+    pub fn kind(&self) -> Kind {
+        all_fields().find(|field| field.name == self.0).map_or(Kind::Scalar, |field| field.kind)
     }
 }
 
@@ -80,8 +90,8 @@ impl JsonSchema for FieldName {
 #[serde(deny_unknown_fields)]
 pub struct Picture {
     pub field: FieldName,
-    /// Component of a vector field; its magnitude if not given.
-    #[schemars(range(min = 0, max = 2))]
+    /// Component of a vector field, or of a tensor (xx yy zz xy yz xz) or its principal values; its magnitude if not given.
+    #[schemars(range(min = 0, max = 5))]
     pub component: Option<usize>,
     /// Time between pictures. At most one of `every`, `every_steps`, `at`; without any, the last instant alone.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
@@ -148,6 +158,40 @@ pub struct CrackTip {
     #[serde(default = "damaged")]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub threshold: f64,
+}
+
+/// The force on a set.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Force {
+    /// The table is written as `force_<name>.csv`.
+    pub name: String,
+    /// The set.
+    pub on: String,
+    /// The place that moments are about; the centroid of the set if not given. Not in 1D.
+    #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
+    pub about: Option<Vec<f64>>,
+    #[schemars(range(min = 1))]
+    pub every_steps: u64,
+}
+
+/// The force through a cut: that of the side of the normal on the other side.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// The table is written as `cut_<name>.csv`.
+    pub name: String,
+    /// A place on the plane, in the undeformed body.
+    #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
+    pub point: Vec<f64>,
+    /// The direction across it, of any length.
+    #[schemars(length(min = 1, max = 3))]
+    pub normal: Vec<f64>,
+    /// The place that moments are about; `point` if not given. Not in 1D.
+    #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
+    pub about: Option<Vec<f64>>,
+    #[schemars(range(min = 1))]
+    pub every_steps: u64,
 }
 
 fn damaged() -> f64 {

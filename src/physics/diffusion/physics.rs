@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::Diffusion;
 use crate::execution::Exec;
 use crate::family::{Body, BondStates, Families};
-use crate::field::{Field, Values};
+use crate::field::{Field, Kind, Values};
 use crate::geometry::{Arrangement, Crack};
 use crate::parallel;
 use crate::physics::{Balance, Column, Content, FieldInfo, Physics, Points};
@@ -59,10 +59,14 @@ type FieldOf<const D: usize> = fn(&Diffusing<D>, usize) -> f64;
 
 impl<const D: usize> Diffusing<D> {
     const FIELDS: &'static [(FieldInfo, FieldOf<D>)] = &[
-        (FieldInfo { name: "concentration", unit: "", about: "C, in the unit of its user" }, |body, slot| {
-            body.concentration[slot]
-        }),
-        (FieldInfo { name: "rate", unit: "1/s", about: "rate of C, sources included" }, |body, slot| body.rate[slot]),
+        (
+            FieldInfo { name: "concentration", unit: "", about: "C, in the unit of its user", kind: Kind::Scalar },
+            |body, slot| body.concentration[slot],
+        ),
+        (
+            FieldInfo { name: "rate", unit: "1/s", about: "rate of C, sources included", kind: Kind::Scalar },
+            |body, slot| body.rate[slot],
+        ),
     ];
 }
 

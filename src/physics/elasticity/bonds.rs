@@ -5,9 +5,11 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::State;
+use super::bond_forces::{BondForce, BondForces};
 use super::density::Density;
 use super::kernels::{Diagonal, DiagonalRow, Energy, Force, Spring};
 use super::material::{Material, On, RowBoundary};
+use super::stretched::most_stretched;
 use super::surface::{Shares, shares_of_bonds};
 use crate::discretization::{BondWeighting, BondWeights};
 use crate::execution::{BlockRow, BreakRule, Broken, Exec, Packs, Unbreakable};
@@ -161,6 +163,36 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
         let rule = Overstrained { failure, law: self.law, displacement: u, limit, largest };
         let (weights, kernel) = (&on.operator.weights, Force(self.law));
         on.exec.sum_bonds_and_break::<D, D, D, Double>(on.body, weights, states, u, force, &kernel, &rule)
+    }
+
+    fn bond_forces<'a>(
+        &'a self,
+        body: &'a Body<D>,
+        weights: &'a BondWeights,
+        states: &'a BondStates,
+        u: [&'a [f64]; D],
+    ) -> BondForces<'a, D> {
+        let law = self.law;
+        let force = move |bit: usize, there: usize, mut bond: Bond<D, f64>, eta: [f64; D]| {
+            let strain = law.strain(&bond, &eta);
+            bond.memory = self.memory.get(bit).map_or(0.0, |memory| memory.to_f64());
+            bond.memory = law.remember(&bond, strain);
+            let pair = law.force(&bond, &eta, strain, [0.0; D]);
+            let (own, stretch) = (pair.map(|f| 0.5 * f), law.stretch_at(strain));
+            BondForce { there, xi: bond.xi, eta, weight: bond.weight, own, pair, stretch }
+        };
+        Box::new(move |slot| Exec::each_bond(body, weights, states, u, slot, force))
+    }
+
+    fn most_stretched(
+        &self,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &mut BondStates,
+        u: [&[P::Field]; D],
+        failure: &CriticalStretch,
+    ) -> Option<(f64, [usize; 2])> {
+        most_stretched::<D, L, P>(self.law, body, weights, states, u, failure)
     }
 
     fn strain_ratio(&self, bond: &Bond<D, f64>, eta: &[f64; D], critical: f64) -> f64 {

@@ -13,6 +13,7 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
 use super::State;
+use super::bond_forces::BondForces;
 use super::density::Density;
 use super::material::{Material, On, Overstretched, RowBoundary};
 use super::surface::Shares;
@@ -22,6 +23,7 @@ use crate::execution::{BlockRow, Broken, Exec, Limits, Motion, Packs};
 use crate::family::{Body, Bond, BondStates, Families};
 use crate::field::{Number, components, components_mut};
 use crate::parallel;
+use crate::physics::failure::CriticalStretch;
 use crate::solver::Drift;
 use crate::visit::Visitor;
 
@@ -379,6 +381,27 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
         largest: &AtomicU64,
     ) -> Broken {
         self.inner.break_beyond(on, states, u, force, limit, largest)
+    }
+
+    fn bond_forces<'a>(
+        &'a self,
+        body: &'a Body<D>,
+        weights: &'a BondWeights,
+        states: &'a BondStates,
+        u: [&'a [f64]; D],
+    ) -> BondForces<'a, D> {
+        self.inner.bond_forces(body, weights, states, u)
+    }
+
+    fn most_stretched(
+        &self,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &mut BondStates,
+        u: [&[P::Field]; D],
+        failure: &CriticalStretch,
+    ) -> Option<(f64, [usize; 2])> {
+        self.inner.most_stretched(body, weights, states, u, failure)
     }
 
     fn strain_ratio(&self, bond: &Bond<D, f64>, eta: &[f64; D], critical: f64) -> f64 {

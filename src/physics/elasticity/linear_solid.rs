@@ -34,11 +34,13 @@ use std::sync::Mutex;
 pub use moduli::Moduli;
 
 use super::State;
+use super::bond_forces::{BondForce, BondForces};
 use super::density::Density;
 use super::kernels::Energy;
 use super::laws::bond_based::{FORCE_SINGLE, STRETCH_SINGLE};
 use super::laws::{BondBased, BondBasedLinear};
 use super::material::{Material, On, RowBoundary};
+use super::stretched::most_stretched;
 use super::surface::{Shares, shares_of_solid};
 use crate::discretization::{BondWeighting, BondWeights};
 use crate::execution::{BreakRule, Exec, Packs};
@@ -301,6 +303,46 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
         let (weights, q) = (&on.operator.weights, [&self.stiffness[..]]);
         on.exec.sum_bonds_adding::<D, 0, 1, D, Double>(on.body, weights, states, [], q, output, &Diagonal);
         diagonal.iter_mut().flat_map(|d| d.iter_mut()).for_each(|d| *d *= self.bound[1]);
+    }
+
+    /// T⟨ξ⟩ V′ = c ω̃ (p + q s) M β V′ with p and q of the point itself.
+    fn bond_forces<'a>(
+        &'a self,
+        body: &'a Body<D>,
+        weights: &'a BondWeights,
+        states: &'a BondStates,
+        u: [&'a [f64]; D],
+    ) -> BondForces<'a, D> {
+        let law = self.law;
+        let mut p = vec![0.0; body.cloud.n_slots()];
+        // Sums of its own: of points with a row too.
+        let kernel = Extension(law);
+        Exec::default().sum_bonds::<D, D, 1, Double>(body, weights, states, u, [&mut p], &kernel);
+        self.scale(&mut p);
+        if let Some(images) = &body.cloud.images {
+            images.fill_scalar(&mut p);
+        }
+        let bonds = move |slot: usize| {
+            let [p_here, q_here] = [p[slot], self.stiffness[slot]];
+            Exec::each_bond(body, weights, states, u, slot, |_, there, bond, eta| {
+                let strain = law.strain(&bond, &eta);
+                let pull = |p, q| L::pull(&bond, &eta, strain, p, q, false, [0.0; D]);
+                let (own, pair) = (pull(p_here, q_here), pull(p_here + p[there], q_here + self.stiffness[there]));
+                BondForce { there, xi: bond.xi, eta, weight: bond.weight, own, pair, stretch: law.stretch_at(strain) }
+            })
+        };
+        Box::new(bonds)
+    }
+
+    fn most_stretched(
+        &self,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &mut BondStates,
+        u: [&[P::Field]; D],
+        failure: &CriticalStretch,
+    ) -> Option<(f64, [usize; 2])> {
+        most_stretched::<D, L, P>(self.law, body, weights, states, u, failure)
     }
 
     fn strain_ratio(&self, bond: &Bond<D, f64>, eta: &[f64; D], critical: f64) -> f64 {

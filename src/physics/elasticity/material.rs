@@ -4,6 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
 use super::State;
+use super::bond_forces::BondForces;
 use super::density::Density;
 use super::hybrid::Work;
 use super::surface::Shares;
@@ -102,6 +103,24 @@ pub trait Material<const D: usize, P: Packs>: Send + Sync {
     ) -> Broken {
         Broken::default()
     }
+    /// The whole bonds of each point and how they pull at displacements `u`.
+    fn bond_forces<'a>(
+        &'a self,
+        body: &'a Body<D>,
+        weights: &'a BondWeights,
+        states: &'a BondStates,
+        u: [&'a [f64]; D],
+    ) -> BondForces<'a, D>;
+    /// The whole bond whose stretch is the largest share of its critical stretch: that share, and the slots of its ends. None
+    /// where no bond is stretched, or none can break. Nothing changes.
+    fn most_stretched(
+        &self,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &mut BondStates,
+        u: [&[P::Field]; D],
+        failure: &CriticalStretch,
+    ) -> Option<(f64, [usize; 2])>;
     /// Strain of a bond over its critical strain, in the measure of the law. `critical`: its critical stretch.
     fn strain_ratio(&self, bond: &Bond<D, f64>, eta: &[f64; D], critical: f64) -> f64;
     /// Energy densities of unit strain over those of a complete family.

@@ -4,6 +4,7 @@
 //! of which law, is a [`Material`].
 
 mod adapt;
+mod bond_forces;
 pub mod bonds;
 pub mod density;
 pub mod discrete;
@@ -14,24 +15,31 @@ pub mod laws;
 pub mod linear_solid;
 pub mod material;
 pub mod moduli;
+mod resultants;
+mod stress;
+mod stretched;
 pub mod surface;
 mod tangent;
 
 use std::ops::Range;
 
 pub use adapt::{Adaptation, INDICATORS};
+pub use bond_forces::{BondForce, BondForces};
 pub use bonds::Bonds;
 pub use density::Density;
 pub use hybrid::{Hybrid, Work};
 use kernels::bonded_volume;
 pub use linear_solid::LinearSolid;
 pub use material::{Material, On, Overstretched, RowBoundary};
+use stretched::stretch_ratios;
 
-use super::{Adapted, Balance, Column, Content, FieldInfo, Physics, Points, Replaced};
+use super::{
+    Adapted, Balance, Column, Content, FieldInfo, ForceAndMoment, Physics, Points, Replaced, Resultant, StretchedBond,
+};
 use crate::discretization::Operator;
 use crate::execution::{Broken, Exec, Packs};
 use crate::family::{Body, BondStates, Families};
-use crate::field::{Double, Field, Number, Precision, Values, components, embed};
+use crate::field::{Double, Field, Kind, Number, Precision, Values, components, embed};
 use crate::geometry::{Arrangement, Crack, Images};
 use crate::parallel;
 use crate::physics::failure::CriticalStretch;
@@ -51,6 +59,8 @@ pub struct Elasticity<const D: usize, P: Packs = Double> {
     pub material: Box<dyn Material<D, P>>,
     pub state: State<P>,
     pub exec: Exec,
+    /// σ_zz over σ_xx + σ_yy in 2D by number of the material: the Poisson ratio in plane strain; empty in plane stress.
+    pub out_of_plane: Vec<f64>,
     /// Σ β V′ over the family before any bond broke, by slot: what damage is measured against.
     family_volume: Vec<P::Field>,
     /// Directed bonds of the body, and how many of them the pre-cracks cut.
@@ -113,6 +123,7 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
             n_bonds: state.states.count(),
             state,
             exec: Exec::default(),
+            out_of_plane: Vec::new(),
             family_volume: Vec::new(),
             n_cut: 0,
             adaptation: None,
@@ -189,9 +200,9 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
 
     /// The fields, each with what computes it at some slots: a line here is all that a field takes.
     const FIELDS: &'static [(FieldInfo, FieldOf<D, P>)] = &[
-        (info("displacement", "m", "u"), |body, slots| body.vectors(&body.state.displacement, slots)),
-        (info("velocity", "m/s", "its rate"), |body, slots| body.vectors(&body.state.velocity, slots)),
-        (info("force", "N/m³", "density of internal force and load"), |body, slots| {
+        (info("displacement", "m", "u").of(Kind::Vector), |body, slots| body.vectors(&body.state.displacement, slots)),
+        (info("velocity", "m/s", "its rate").of(Kind::Vector), |body, slots| body.vectors(&body.state.velocity, slots)),
+        (info("force", "N/m³", "density of internal force and load").of(Kind::Vector), |body, slots| {
             body.vectors(&body.state.force, slots)
         }),
         (info("damage", "", "φ, 0 whole to 1 free of all bonds"), |body, slots| {
@@ -216,6 +227,26 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         (info("scheme", "", "1 where bonds are summed, 0 where a point has a row of collocation"), |body, slots| {
             Values::Scalar(gather(slots, &|slot| body.material.scheme(slot)))
         }),
+        (info("stress", "Pa", "σ of the forces in the family: xx yy zz xy yz xz").of(Kind::Tensor), |body, slots| {
+            Values::Tensor(body.stress(slots))
+        }),
+        (info("principal_stress", "Pa", "eigenvalues of σ, the largest first").of(Kind::Principal), |body, slots| {
+            Values::Principal(body.of_stress(slots, stress::principal))
+        }),
+        (info("von_mises", "Pa", "√(3/2 s : s), s the deviator of σ"), |body, slots| {
+            Values::Scalar(body.of_stress(slots, stress::von_mises))
+        }),
+        (info("pressure", "Pa", "−(σ_xx + σ_yy + σ_zz)/3"), |body, slots| {
+            Values::Scalar(body.of_stress(slots, stress::pressure))
+        }),
+        (
+            info("strain", "", "ε of linear laws, else Green–Lagrange: xx yy zz xy yz xz").of(Kind::Tensor),
+            |body, slots| Values::Tensor(body.strain(slots)),
+        ),
+        (info("stretch_ratio", "", "largest stretch over critical stretch of the bonds that hold"), |body, slots| {
+            let failure = body.failure.clone();
+            Values::Scalar(body.pulled(|pulled| stretch_ratios(pulled, failure.as_ref(), slots)))
+        }),
     ];
 }
 
@@ -223,7 +254,13 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
 type FieldOf<const D: usize, P> = fn(&mut Elasticity<D, P>, &[u32]) -> Values;
 
 const fn info(name: &'static str, unit: &'static str, about: &'static str) -> FieldInfo {
-    FieldInfo { name, unit, about }
+    FieldInfo { name, unit, about, kind: Kind::Scalar }
+}
+
+impl FieldInfo {
+    const fn of(self, kind: Kind) -> Self {
+        FieldInfo { kind, ..self }
+    }
 }
 
 /// The fields of elastic bodies.
@@ -393,6 +430,22 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
 
     fn broken(&self) -> Broken {
         self.state.broken
+    }
+
+    fn resultant(&mut self, of: &Resultant) -> Option<ForceAndMoment> {
+        self.force_and_moment(of)
+    }
+
+    fn most_stretched(&mut self) -> Option<StretchedBond> {
+        let Elasticity { body, operator, failure, material, state, .. } = self;
+        if let Some(images) = &body.cloud.images {
+            images.fill(&mut state.displacement);
+        }
+        let u = components::<D, _>(&state.displacement);
+        let (ratio, ends) =
+            material.most_stretched(body, &operator.weights, &mut state.states, u, failure.as_ref()?)?;
+        let [a, b] = ends.map(|slot| body.cloud.position(slot));
+        Some(StretchedBond { ratio, position: embed::<D>(&std::array::from_fn(|d| 0.5 * (a[d] + b[d]))) })
     }
 
     fn dissipates(&self) -> bool {

@@ -33,6 +33,11 @@ impl<const D: usize> BondLaw<D> for BondBased {
         stretch * (2.0 + stretch)
     }
 
+    /// √(1 + q) − 1, without its cancellation.
+    fn stretch_at(&self, strain: f64) -> f64 {
+        strain / (1.0 + (1.0 + strain).sqrt())
+    }
+
     #[inline(always)]
     fn force<L: Lane>(&self, bond: &Bond<D, L>, eta: &[L; D], strain: L, sum: [L; D]) -> [L; D] {
         let square = L::splat(1.0) + strain;

@@ -26,6 +26,10 @@ impl<const D: usize> BondLaw<D> for BondBasedLinear {
         stretch
     }
 
+    fn stretch_at(&self, strain: f64) -> f64 {
+        strain
+    }
+
     #[inline(always)]
     fn force<L: Lane>(&self, bond: &Bond<D, L>, _eta: &[L; D], strain: L, mut sum: [L; D]) -> [L; D] {
         let factor = bond.spring * strain;
