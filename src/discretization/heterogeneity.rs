@@ -104,14 +104,17 @@ impl Heterogeneity {
                 parallel::map(relative.len(), &of_point)
             }
             Families::Lattice(families) => {
-                let lattice = &families.lattice;
+                let (lattice, n) = (&families.lattice, families.offsets.len());
+                // What lies behind the end of a row is no neighbour.
+                let whole = BondStates::whole(body);
                 let of_block = |block: usize| {
                     let first = lattice.guard + block * BLOCK;
                     let mut seen = [NO_POINT; 2];
-                    for slot in (first..first + BLOCK).filter(|&slot| of_slot[slot] != NO_POINT) {
-                        see(&mut seen, slot);
-                        let there = families.offsets.iter().map(|offset| slot.wrapping_add_signed(offset.shift));
-                        there.for_each(|there| see(&mut seen, there));
+                    (first..first + BLOCK).for_each(|slot| see(&mut seen, slot));
+                    for (offset, word) in families.offsets.iter().zip(&whole.words()[block * n..(block + 1) * n]) {
+                        for lane in (0..BLOCK).filter(|lane| word >> lane & 1 == 1) {
+                            see(&mut seen, (first + lane).wrapping_add_signed(offset.shift));
+                        }
                     }
                     if seen[0] == NO_POINT { [0; 2] } else { seen }
                 };

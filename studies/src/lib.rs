@@ -20,11 +20,13 @@ mod hybrid_example_1;
 mod hybrid_example_2;
 mod hybrid_wave;
 mod inclusion;
+mod joint;
 mod kirsch;
 mod navier;
 mod precision;
 mod refined_branching;
 mod surface_effect;
+mod two_layers;
 mod wave;
 mod wave_interface;
 
@@ -92,6 +94,7 @@ pub const STUDIES: &[Study] = &[
     precision::PRECISION,
     double_cantilever::STUDY,
     kirsch::STUDY,
+    joint::STUDY,
     inclusion::STUDY,
     delamination::STUDY,
     convergence::STUDY,
@@ -99,6 +102,7 @@ pub const STUDIES: &[Study] = &[
     refined_branching::STUDY,
     surface_effect::STUDY,
     hybrid_example_1::STUDY,
+    two_layers::STUDY,
     hybrid_example_2::STUDY,
     hybrid_branching::STUDY,
     hybrid_wave::STUDY,
