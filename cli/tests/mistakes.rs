@@ -12,6 +12,23 @@ use std::time::{Duration, Instant};
 /// No refusal takes longer than this, whatever the file; most take a hundredth of it.
 const LONGEST: Duration = Duration::from_secs(20);
 
+/// A bar, whose force has a moment.
+const BAR: &str = r#"[case]
+title = "Bar"
+dimension = 1
+[geometry]
+shape = { segment = { low = 0.0, high = 0.02 } }
+spacing = 1e-3
+[discretization]
+horizon_ratio = 3
+[physics.elasticity]
+law = { bond_based = { young = 72e9, density = 2440.0 } }
+[solver.velocity_verlet]
+end_time = 1e-6
+[[output]]
+force = { name = "a", on = "all", about = [0.0], every_steps = 10 }
+"#;
+
 /// Words of the program's own language, which a user does not speak.
 const JARGON: [&str; 12] =
     ["f64", "f32", "u64", "u32", "i64", "usize", "struct", "variant", "enum", "serde", "panicked", "unwrap"];
@@ -388,7 +405,46 @@ fn mistakes() -> Vec<Mistake> {
             &[("end_time = \"5 us\"", "end_time = \"60 s\""), ("every_steps = 10", "every_steps = 1")],
         ),
         patch("every_and_every_steps", "every_steps = 10", "every_steps = 10, every = \"1 us\""),
-        patch("unknown_field", "vtu = { every_steps = 10", "vtu = { every_steps = 10, fields = [\"stress\"]"),
+        patch("unknown_field", "vtu = { every_steps = 10", "vtu = { every_steps = 10, fields = [\"stresses\"]"),
+        patch("component_of_a_tensor", "vtu = { every_steps = 10 }", "picture = { field = \"stress\", component = 4 }"),
+        patch("component_of_a_number", "vtu = { every_steps = 10 }", "picture = { field = \"damage\", component = 0 }"),
+        patch(
+            "component_beyond_tensors",
+            "vtu = { every_steps = 10 }",
+            "picture = { field = \"stress\", component = 6 }",
+        ),
+        patch(
+            "force_on_undefined_set",
+            "vtu = { every_steps = 10 }",
+            "force = { name = \"a\", on = \"topp\", every_steps = 10 }",
+        ),
+        patch(
+            "force_about_three",
+            "vtu = { every_steps = 10 }",
+            "force = { name = \"a\", on = \"top\", about = [0, 0, 0], every_steps = 10 }",
+        ),
+        Mistake::whole("force_about_in_1d", BAR),
+        patch(
+            "force_outside_the_folder",
+            "vtu = { every_steps = 10 }",
+            "force = { name = \"../a\", on = \"top\", every_steps = 10 }",
+        ),
+        patch(
+            "cut_along_nothing",
+            "vtu = { every_steps = 10 }",
+            "cut = { name = \"a\", point = [0, 0], normal = [0, 0], every_steps = 10 }",
+        ),
+        patch(
+            "cut_of_3d_in_2d",
+            "vtu = { every_steps = 10 }",
+            "cut = { name = \"a\", point = [0, 0], normal = [0, 0, 1], every_steps = 10 }",
+        ),
+        patch(
+            "cut_twice",
+            "vtu = { every_steps = 10 }",
+            "cut = { name = \"a\", point = [0, 0], normal = [1, 0], every_steps = 10 }\n\n[[output]]\ncut = { name = \"A\", \
+             point = [0.001, 0], normal = [1, 0], every_steps = 10 }",
+        ),
         patch(
             "picture_range_reversed",
             "vtu = { every_steps = 10 }",

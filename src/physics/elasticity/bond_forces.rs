@@ -1,7 +1,7 @@
 //! How each whole bond pulls: what stresses, forces through cuts and stretches of points are made of.
 //!
-//! A force state T gives the force density between two points as f(x, x′) = T\[x\]⟨ξ⟩ − T\[x′\]⟨−ξ⟩ (Silling et al. 2007,
-//! eq. (28)). Bond by bond, in double precision whatever the fields, and of all whole bonds: also of points that have a row in the
+//! A force state T gives the force density between two points as f(x, x′) = T\[x\]⟨ξ⟩ − T\[x′\]⟨−ξ⟩ (Silling et al.
+//! 2007). Bond by bond, in double precision whatever the fields, and of all whole bonds: also of points that have a row in the
 //! hybrid scheme, whose force is another.
 
 use super::Elasticity;

@@ -1,7 +1,7 @@
 //! Forces and moments on sets of points, and those that bonds transmit through a plane.
 //!
 //! Of a set Σ (f + b) V, which is the rate of its momentum; through a plane Σ Σ f(x, x′) V V′ over the whole bonds from x behind
-//! it to x′ before it (Lehoucq & Silling 2008, "Force flux and the peridynamic stress tensor", section 3). Pairs within a part
+//! it to x′ before it (Lehoucq & Silling 2008, "Force flux and the peridynamic stress tensor"). Pairs within a part
 //! cancel, so that
 //!
 //! ```text

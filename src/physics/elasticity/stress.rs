@@ -11,10 +11,10 @@
 //! E = ½ (H + Hᵀ + Hᵀ H)                                     the others: ½ (Fᵀ F − 1)
 //! ```
 //!
-//! P is the peridynamic stress of Lehoucq & Silling (2008, "Force flux and the peridynamic stress tensor", eq. (8)) where the
-//! deformation is uniform, and the collapsed stress of Silling & Lehoucq (2008, "Convergence of peridynamics to classical
-//! elasticity theory", eq. (9)) elsewhere; F and K are those of Silling et al. (2007), eq. (18). T is along ξ or y, so that σ
-//! is symmetric. See `docs/theory/stress.md` for what they mean at surfaces and beside cracks.
+//! P is the collapsed stress of Silling & Lehoucq (2008, "Convergence of peridynamics to classical elasticity theory"), which
+//! for a uniform deformation is the peridynamic stress of Lehoucq & Silling (2008, "Force flux and the peridynamic stress
+//! tensor"); K and F are the shape tensor and the deformation gradient of Silling et al. (2007). T is along ξ or y, so that σ is
+//! symmetric. See `docs/theory/stress.md` for what they mean at surfaces and beside cracks.
 
 use super::Elasticity;
 use super::bond_forces::{BondForce, Pulled};
