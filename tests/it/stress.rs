@@ -41,7 +41,7 @@ pub fn body<const D: usize, P: Packs>(law: Law, cloud: Cloud<D>, failure: Option
         micromodulus(hypothesis, &INFLUENCE, YOUNG, body.horizon)
     };
     let operator = Operator::standard(&body, strength, INFLUENCE, RULE);
-    let material = law.material::<D, P>(&moduli, &body, &operator.weights);
+    let material = law.material::<D, P>(&[moduli], &body, &operator.weights);
     Elasticity::new(body, operator, material, 2440.0, failure)
 }
 
