@@ -4,6 +4,7 @@ mod architecture;
 mod common;
 mod diffusion;
 mod diffusion_cases;
+mod diffusion_mistakes;
 mod engine;
 mod forces;
 mod hybrid;
