@@ -14,8 +14,23 @@ pub struct Vectors<'a, T> {
     pub rate: &'a mut [T],
     /// τ (s) and where u + τ v is wanted after a drift, if it is.
     pub damped: Option<(f64, &'a mut [T])>,
-    /// ρ over the inertia of the unknown, and that over ρ, by place in a component; None where that is the inertia of all.
-    pub relative_inertia: Option<[&'a [T]; 2]>,
+    /// ρ over the inertia of the unknown, by place in a component; None where that is the inertia of all.
+    pub relative_inertia: Option<RelativeInertia<'a, T>>,
+}
+
+/// ρ over the inertia of an unknown where it differs from place to place.
+#[derive(Debug, Clone, Copy)]
+pub struct RelativeInertia<'a, T> {
+    pub relative: &'a [T],
+    /// 1/relative
+    pub inverse: &'a [T],
+    /// Whether so many consecutive places have the same: of the places of each such run, the last may be shorter.
+    pub alike: &'a [bool],
+}
+
+impl<T> RelativeInertia<'_, T> {
+    /// Places in a run.
+    pub const RUN: usize = 16;
 }
 
 /// The same in the numbers that they are stored in, and what solvers need to know of them.
@@ -64,17 +79,17 @@ pub struct Component<'a, T> {
     /// Empty of an equation of first order.
     pub velocity: &'a mut [T],
     pub rate: &'a mut [T],
-    pub relative_inertia: Option<[&'a [T]; 2]>,
+    pub relative_inertia: Option<RelativeInertia<'a, T>>,
 }
 
 impl<T: Number> Component<'_, T> {
     /// ρ at a place, of an unknown with this inertia.
     pub fn inertia(&self, unit: f64, slot: usize) -> f64 {
-        self.relative_inertia.map_or(unit, |[relative, _]| unit * relative[slot].to_f64())
+        self.relative_inertia.map_or(unit, |by_place| unit * by_place.relative[slot].to_f64())
     }
 }
 
-impl<T> Vectors<'_, T> {
+impl<T: Copy> Vectors<'_, T> {
     /// Component `c` of `n`.
     pub fn component(&mut self, c: usize, n: usize) -> Component<'_, T> {
         let [value, velocity, rate] = [&mut *self.value, &mut *self.velocity, &mut *self.rate].map(|flat| {

@@ -20,7 +20,7 @@ impl ForwardEuler {
         let (t, dt) = (clock.time(), clock.dt);
         let mut unknown = system.unknown();
         let by = dt / unknown.inertia;
-        with!(unknown, vectors => go(vectors.value, vectors.rate, by, vectors.relative_inertia.map(|[_, inverse]| inverse)));
+        with!(unknown, vectors => go(vectors.value, vectors.rate, by, vectors.relative_inertia.map(|by_place| by_place.inverse)));
         clock.step += 1;
         system.constrain(Stage::Drift, t, dt);
         system.evolve(clock.time(), dt);

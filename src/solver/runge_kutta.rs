@@ -156,7 +156,7 @@ fn each<T: Number>(
     let moving = vectors.value.par_chunks_mut(CHUNK).zip(vectors.velocity.par_chunks_mut(CHUNK));
     let fixed = vectors.rate.par_chunks(CHUNK).zip(u0.par_chunks(CHUNK)).zip(v0.par_chunks(CHUNK));
     let sums = du.par_chunks_mut(CHUNK).zip(dv.par_chunks_mut(CHUNK));
-    let inverse = vectors.relative_inertia.map(|[_, inverse]| inverse);
+    let inverse = vectors.relative_inertia.map(|by_place| by_place.inverse);
     moving.zip(fixed).zip(sums).enumerate().for_each(|(chunk, (((u, v), ((f, u0), v0)), (du, dv)))| {
         let moving = u.iter_mut().zip(v);
         let fixed = f.iter().zip(u0).zip(v0);

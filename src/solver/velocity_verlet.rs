@@ -3,6 +3,8 @@
 //! v(n+½) = v(n) + Δt/2 a(n); u(n+1) = u(n) + Δt v(n+½); v(n+1) = v(n+½) + Δt/2 a(n+1); Shojaei et al. 2022, eq. (29).
 //! Second order, symplectic, energy without drift. Bonds break between the drift and the new force.
 
+mod varied;
+
 use rayon::prelude::*;
 
 use super::{Clock, Stage, System};
@@ -51,7 +53,7 @@ impl VelocityVerlet {
         with!(unknown, vectors => {
             let kick = Kick::new(&drift);
             if let Some(relative) = vectors.relative_inertia {
-                return finish_varied(kick, vectors.velocity, vectors.rate, relative);
+                return varied::finish(kick, vectors.velocity, vectors.rate, relative);
             }
             let chunks = vectors.velocity.par_chunks_mut(CHUNK).zip(vectors.rate.par_chunks(CHUNK));
             let squares = chunks.map(|(velocity, force)| wide(Chunk { kick, velocity, force }));
@@ -99,7 +101,7 @@ impl Drift {
             let Vectors { value, velocity, rate, damped, relative_inertia } = vectors;
             if let Some(relative) = *relative_inertia {
                 let damped = damped.as_mut().map_or(&mut [][..], |(_, damped)| &mut **damped);
-                return self.everywhere_varied(value, velocity, rate, damped, relative);
+                return varied::everywhere(self, value, velocity, rate, damped, relative);
             }
             let chunks = value.par_chunks_mut(CHUNK).zip(velocity.par_chunks_mut(CHUNK)).zip(rate.par_chunks(CHUNK));
             let squares: Vec<f64> = match damped {
@@ -111,43 +113,6 @@ impl Drift {
             };
             squares.iter().sum()
         })
-    }
-
-    fn everywhere_varied<T: Number>(
-        &self,
-        value: &mut [T],
-        velocity: &mut [T],
-        rate: &[T],
-        damped: &mut [T],
-        [relative, inverse]: [&[T]; 2],
-    ) -> f64 {
-        let [keep, dt, tau, still] = [self.keep, self.dt, self.tau, self.still].map(T::from_f64);
-        let (n, has_damped) = (relative.len(), !damped.is_empty());
-        let mut squares = 0.0;
-        for c in 0..value.len() / n {
-            let part = c * n..(c + 1) * n;
-            let damped = if has_damped { &mut damped[part.clone()] } else { &mut [][..] };
-            let mut damped = damped.chunks_mut(CHUNK);
-            let chunks: Vec<_> = value[part.clone()]
-                .chunks_mut(CHUNK)
-                .zip(velocity[part.clone()].chunks_mut(CHUNK))
-                .zip(rate[part].chunks(CHUNK).zip(relative.chunks(CHUNK).zip(inverse.chunks(CHUNK))))
-                .map(|((displacement, velocity), (force, (relative, inverse)))| {
-                    let (kick, damped) = (Kick::new(self), damped.next().unwrap_or_default());
-                    let pass = Pass { kick, keep, dt, tau, still, displacement, velocity, force, damped };
-                    (pass, [relative, inverse])
-                })
-                .collect();
-            let sums: Vec<f64> = if self.pending {
-                let sum = |(pass, relative)| wide(VariedPass::<_, true> { pass, relative });
-                chunks.into_par_iter().map(sum).collect()
-            } else {
-                let sum = |(pass, relative)| wide(VariedPass::<_, false> { pass, relative });
-                chunks.into_par_iter().map(sum).collect()
-            };
-            squares += sums.iter().sum::<f64>();
-        }
-        squares
     }
 
     /// The pass over some numbers; `damped` is empty or gets u + τ v.
@@ -183,104 +148,6 @@ impl<T: Number> Kick<T> {
         let v = unless_below(self.slow, (v + self.factor * f) * self.after);
         *square += v.to_f64() * v.to_f64();
         v
-    }
-
-    /// The same of a place that is `relative` times as inert, as is the square that counts.
-    #[inline(always)]
-    fn kicked_varied(&self, v: T, f: T, [relative, inverse]: [T; 2], square: &mut f64) -> T {
-        let v = unless_below(self.slow, (v + self.factor * (f * inverse)) * self.after);
-        *square += v.to_f64() * v.to_f64() * relative.to_f64();
-        v
-    }
-}
-
-/// The last half kick where inertia differs from place to place: Σ v² ρ/ρ₀.
-fn finish_varied<T: Number>(kick: Kick<T>, velocity: &mut [T], rate: &[T], [relative, inverse]: [&[T]; 2]) -> f64 {
-    let components = velocity.par_chunks_mut(relative.len()).zip(rate.par_chunks(relative.len()));
-    let squares = components.flat_map(|(velocity, rate)| {
-        let relative = relative.par_chunks(CHUNK).zip(inverse.par_chunks(CHUNK));
-        let chunks = velocity.par_chunks_mut(CHUNK).zip(rate.par_chunks(CHUNK)).zip(relative);
-        chunks.map(|((velocity, rate), (m, i))| wide(VariedChunk { kick, velocity, rate, relative: [m, i] }))
-    });
-    squares.collect::<Vec<f64>>().iter().sum()
-}
-
-struct VariedChunk<'a, T> {
-    kick: Kick<T>,
-    velocity: &'a mut [T],
-    rate: &'a [T],
-    relative: [&'a [T]; 2],
-}
-
-impl<T: Number> Sweep for VariedChunk<'_, T> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        let mut squares = [0.0; LANES];
-        let (vs, v) = self.velocity.as_chunks_mut::<LANES>();
-        let [relative, inverse] = self.relative;
-        let ((fs, f), (ms, m)) = (self.rate.as_chunks::<LANES>(), relative.as_chunks::<LANES>());
-        let (is, i) = inverse.as_chunks::<LANES>();
-        for ((v, f), (m, i)) in vs.iter_mut().zip(fs).zip(ms.iter().zip(is)) {
-            for k in 0..LANES {
-                v[k] = self.kick.kicked_varied(v[k], f[k], [m[k], i[k]], &mut squares[k]);
-            }
-        }
-        for k in 0..v.len() {
-            v[k] = self.kick.kicked_varied(v[k], f[k], [m[k], i[k]], &mut squares[k]);
-        }
-        squares.iter().sum()
-    }
-}
-
-/// [`Pass`] where inertia differs from place to place.
-struct VariedPass<'a, T, const PENDING: bool> {
-    pass: Pass<'a, T>,
-    /// ρ/ρ₀ and its inverse.
-    relative: [&'a [T]; 2],
-}
-
-impl<T: Number, const PENDING: bool> VariedPass<'_, T, PENDING> {
-    /// At most [`LANES`] numbers.
-    #[inline(always)]
-    fn some(
-        kick: &Kick<T>,
-        [keep, dt, still]: [T; 3],
-        [u, v]: [&mut [T]; 2],
-        [f, relative, inverse]: [&[T]; 3],
-        squares: &mut [f64; LANES],
-    ) {
-        for k in 0..u.len() {
-            if PENDING {
-                v[k] = kick.kicked_varied(v[k], f[k], [relative[k], inverse[k]], &mut squares[k]);
-            }
-            v[k] = unless_below(kick.slow, keep * v[k] + kick.factor * (f[k] * inverse[k]));
-            u[k] = unless_below(still, u[k] + dt * v[k]);
-        }
-    }
-}
-
-impl<T: Number, const PENDING: bool> Sweep for VariedPass<'_, T, PENDING> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        let Pass { kick, keep, dt, tau, still, displacement, velocity, force, damped } = self.pass;
-        let [relative, inverse] = self.relative;
-        let mut squares = [0.0; LANES];
-        let by = [keep, dt, still];
-        let ((us, u), (vs, v)) = (displacement.as_chunks_mut::<LANES>(), velocity.as_chunks_mut::<LANES>());
-        let ((fs, f), (ms, m)) = (force.as_chunks::<LANES>(), relative.as_chunks::<LANES>());
-        let (is, i) = inverse.as_chunks::<LANES>();
-        for (((u, v), f), (m, i)) in us.iter_mut().zip(vs).zip(fs).zip(ms.iter().zip(is)) {
-            Self::some(&kick, by, [u, v], [f, m, i], &mut squares);
-        }
-        Self::some(&kick, by, [u, v], [f, m, i], &mut squares);
-        for ((damped, u), v) in damped.iter_mut().zip(displacement).zip(velocity) {
-            *damped = *u + tau * *v;
-        }
-        squares.iter().sum()
     }
 }
 

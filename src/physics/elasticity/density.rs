@@ -2,6 +2,7 @@
 
 use crate::discretization::Heterogeneity;
 use crate::field::Number;
+use crate::unknown::RelativeInertia;
 
 /// Densities, in the numbers of the fields that they divide.
 #[derive(Debug, Clone)]
@@ -11,12 +12,14 @@ pub struct Density<F> {
     /// ρ/ρ₀ by slot, and ρ₀/ρ; empty where all points have ρ₀.
     relative: Vec<F>,
     inverse: Vec<F>,
+    /// Of each run of slots whether they have the same.
+    alike: Vec<bool>,
 }
 
 impl<F: Number> Density<F> {
     /// Of all points, kg/m³.
     pub fn same(density: f64) -> Self {
-        Density { unit: density, relative: Vec::new(), inverse: Vec::new() }
+        Density { unit: density, relative: Vec::new(), inverse: Vec::new(), alike: Vec::new() }
     }
 
     /// ρ by slot, kg/m³; zero where there is no point.
@@ -25,30 +28,38 @@ impl<F: Number> Density<F> {
         if densities.iter().all(|&density| density == unit || density == 0.0) {
             return Density::same(unit);
         }
-        // A slot without a point is at rest whatever it weighs.
-        let relative = |&density: &f64| if density > 0.0 { density / unit } else { 1.0 };
-        Density {
-            unit,
-            relative: densities.iter().map(|density| F::from_f64(relative(density))).collect(),
-            inverse: densities.iter().map(|density| F::from_f64(1.0 / relative(density))).collect(),
-        }
+        // A slot without a point is at rest whatever it weighs: as much as what is before it, so that runs are longer.
+        let mut last = 1.0;
+        let relative = densities.iter().map(|&density| {
+            if density > 0.0 {
+                last = density / unit;
+            }
+            last
+        });
+        Density::of(unit, relative.collect())
     }
 
-    /// ρ/ρ₀ and ρ₀/ρ by slot; None where all points have ρ₀.
-    pub fn relative_and_inverse(&self) -> Option<[&[F]; 2]> {
-        (!self.is_same()).then_some([&self.relative[..], &self.inverse[..]])
+    fn of(unit: f64, relative: Vec<f64>) -> Self {
+        let alike = relative.chunks(RelativeInertia::<F>::RUN).map(|run| run.iter().all(|m| *m == run[0])).collect();
+        let inverse = relative.iter().map(|m| F::from_f64(1.0 / m)).collect();
+        Density { unit, relative: relative.into_iter().map(F::from_f64).collect(), inverse, alike }
+    }
+
+    /// ρ/ρ₀ by slot, as solvers ask for it; None where all points have ρ₀.
+    pub fn by_place(&self) -> Option<RelativeInertia<'_, F>> {
+        let Density { relative, inverse, alike, .. } = self;
+        (!self.is_same()).then_some(RelativeInertia { relative, inverse, alike })
     }
 
     /// The same, but so inert that nothing moves it where `moves` does not hold.
     pub fn only(&self, n_slots: usize, moves: impl Fn(usize) -> bool) -> Self {
         let relative = |slot: usize| if moves(slot) { self.at(slot) / self.unit } else { 1e30 };
-        let relative: Vec<F> = (0..n_slots).map(|slot| F::from_f64(relative(slot))).collect();
-        Density { unit: self.unit, inverse: relative.iter().map(|m| F::from_f64(1.0 / m.to_f64())).collect(), relative }
+        Density::of(self.unit, (0..n_slots).map(relative).collect())
     }
 
     /// Bytes.
     pub fn memory(&self) -> usize {
-        size_of_val(&self.relative[..]) + size_of_val(&self.inverse[..])
+        size_of_val(&self.relative[..]) + size_of_val(&self.inverse[..]) + self.alike.len()
     }
 
     /// kg/m³
@@ -81,9 +92,9 @@ impl<F: Number> Density<F> {
 
     /// For points of which each is of the material of one before: `from` by slot.
     pub fn inherited(&self, from: &[usize]) -> Self {
-        let inherited = |values: &[F]| {
-            if values.is_empty() { Vec::new() } else { from.iter().map(|&old| values[old]).collect() }
-        };
-        Density { unit: self.unit, relative: inherited(&self.relative), inverse: inherited(&self.inverse) }
+        if self.is_same() {
+            return self.clone();
+        }
+        Density::of(self.unit, from.iter().map(|&old| self.relative[old].to_f64()).collect())
     }
 }

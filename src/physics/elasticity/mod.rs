@@ -272,7 +272,7 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
     fn unknown(&mut self) -> Unknown<'_> {
         let State { displacement, velocity, force, .. } = &mut self.state;
         let damped = self.material.damped();
-        let relative_inertia = self.density.relative_and_inverse();
+        let relative_inertia = self.density.by_place();
         Unknown {
             vectors: P::Field::numbers(Vectors {
                 value: displacement,
