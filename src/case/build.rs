@@ -249,7 +249,7 @@ impl<const D: usize> Builder<'_, D> {
                 self.load(k, load, &body.cloud, shape.as_ref(), &slots, &mut terms)?;
             }
         }
-        self.sets_of_outputs(&elasticity.body.cloud)?;
+        self.parts_of_outputs(&elasticity.body.cloud)?;
         let bar_speed = (parameters.young / parameters.density).sqrt();
         if let Some(settings) = settings {
             elasticity = self.hybridise(settings, elasticity, solid, &scaling, horizon / bar_speed)?;
