@@ -435,6 +435,11 @@ fn mistakes() -> Vec<Mistake> {
             "cut = { name = \"a\", point = [0, 0], normal = [0, 0], every_steps = 10 }",
         ),
         patch(
+            "cut_beside_the_body",
+            "vtu = { every_steps = 10 }",
+            "cut = { name = \"a\", point = [\"20 mm\", 0], normal = [1, 0], every_steps = 10 }",
+        ),
+        patch(
             "cut_of_3d_in_2d",
             "vtu = { every_steps = 10 }",
             "cut = { name = \"a\", point = [0, 0], normal = [0, 0, 1], every_steps = 10 }",

@@ -285,7 +285,7 @@ impl<const D: usize> Builder<'_, D> {
                 self.load(k, load, &body.cloud, shape.as_ref(), &slots, &mut terms)?;
             }
         }
-        self.sets_of_outputs(&elasticity.body.cloud)?;
+        self.parts_of_outputs(&elasticity.body.cloud)?;
         let materials = self.summaries(&mut elasticity, composition.as_ref(), &reference, hypothesis);
         // A crack is no faster than in the fastest material, and the slowest needs the longest τ.
         let speeds = || materials.iter().map(|material| material.bar_speed);

@@ -121,7 +121,11 @@ fn forces_and_moments_behind_a_cut_are_those_through_it() {
             body.evolve(0.0);
             assert!(body.state.broken.bonds > 0);
             // Through points of the lattice, between them, and askew.
-            let mid = cloud.position(cloud.slots[cloud.n_points() / 2] as usize);
+            let positions: Vec<[f64; D]> = cloud.slots.iter().map(|&slot| cloud.position(slot as usize)).collect();
+            let mean: [f64; D] =
+                std::array::from_fn(|d| positions.iter().map(|x| x[d]).sum::<f64>() / positions.len() as f64);
+            let off = |x: &[f64; D]| (0..D).map(|d| (x[d] - mean[d]).powi(2)).sum::<f64>();
+            let mid = positions.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
             let mid: [f64; 3] = std::array::from_fn(|d| if d < D { mid[d] } else { 0.0 });
             for normal in [[1.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [0.5, 1.0, -0.3]] {
                 let normal = std::array::from_fn(|d| if d < D { normal[d] } else { 0.0 });
@@ -155,6 +159,51 @@ fn forces_and_moments_behind_a_cut_are_those_through_it() {
     check::<3, Double>(perturbed([6, 5, 5]), 1e-13);
     // Forces of points are those of single precision.
     check::<2, Mixed>(lattice([13, 11, 1]), 1e-5);
+}
+
+/// Weights that belong to single bonds: cells of two sizes, corrected surfaces.
+#[test]
+fn cuts_balance_in_refined_and_corrected_bodies() {
+    let zones = "[refinement]\nlevels = 1\nzones = [{ level = 1, region = { where = \"x < 0.001\" } }]";
+    for (more, correction) in [(zones, "none"), ("", "energy"), ("", "volume"), (zones, "energy")] {
+        let mut bar = case(&format!(
+            r#"
+[case]
+title = "Struck"
+dimension = 2
+[geometry]
+shape = {{ rectangle = {{ size = [0.04, 0.012] }} }}
+spacing = 1e-3
+[sets]
+behind = {{ where = "x < 0.0021" }}
+[discretization]
+horizon_ratio = 3.0
+surface_correction = "{correction}"
+{more}
+[physics.elasticity]
+law = {{ bond_based = {{ young = 70e9, density = 2700.0 }} }}
+[[conditions]]
+on = "all"
+initial = {{ velocity = {{ component = 0, value = "10*x/0.02" }} }}
+[[conditions]]
+on = "all"
+initial = {{ velocity = {{ component = 1, value = "20*sin(x/0.003)" }} }}
+[solver.velocity_verlet]
+end_time = 3e-6
+"#
+        ));
+        bar.model.start();
+        while bar.clock.step < bar.n_steps {
+            bar.model.step(&bar.solver, &mut bar.clock).unwrap();
+        }
+        let about = [0.001, 0.0, 0.0];
+        let set = Resultant::OnSet { set: "behind".into(), about: Some(about) };
+        let through = Resultant::ThroughCut { point: [0.0021, 0.0, 0.0], normal: [1.0, 0.0, 0.0], about };
+        let [on, cut] = [set, through].map(|of| bar.model.resultant(&of).unwrap());
+        // Stored weights of the two directions of a bond are rounded apart.
+        assert!(far(on.force, cut.force) < 1e-10 * far(cut.force, [0.0; 3]), "{more} {correction}: {on:?} {cut:?}");
+        assert!(far(on.moment, cut.moment) < 1e-10 * 0.02 * far(cut.force, [0.0; 3]), "{more} {correction}");
+    }
 }
 
 /// Velocity Verlet changes a momentum by the mean of the forces at both ends of a step, exactly.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::super::model::{self, FieldName, Output};
+use super::conditions::rounded;
 use super::{Builder, DAMAGED, MANY_FILES};
 use crate::error::Result;
 use crate::geometry::Cloud;
@@ -24,14 +25,35 @@ impl<const D: usize> Builder<'_, D> {
         Ok(())
     }
 
-    /// Refuses outputs on sets that the body does not have.
-    pub(super) fn sets_of_outputs(&self, cloud: &Cloud<D>) -> Result<()> {
+    /// Refuses outputs on sets that the body does not have, and cuts that miss it.
+    pub(super) fn parts_of_outputs(&self, cloud: &Cloud<D>) -> Result<()> {
         for (k, output) in self.case.value.output.iter().enumerate() {
-            if let Output::Force(force) = output {
-                self.slots(&force.on, cloud, &format!("output[{k}].force.on"))?;
+            match output {
+                Output::Force(force) => {
+                    self.slots(&force.on, cloud, &format!("output[{k}].force.on"))?;
+                }
+                Output::Cut(cut) => self.meets(cut, cloud, &format!("output[{k}].cut.point"))?,
+                _ => {}
             }
         }
         Ok(())
+    }
+
+    /// Whether points are on both sides of a cut.
+    fn meets(&self, cut: &model::Cut, cloud: &Cloud<D>, path: &str) -> Result<()> {
+        let height = |x: &[f64; D]| (0..D).map(|d| (x[d] - cut.point[d]) * cut.normal[d]).sum::<f64>();
+        let ahead = cloud.select(|x| height(x) > 0.0).len();
+        if ahead > 0 && ahead < cloud.n_points() {
+            return Ok(());
+        }
+        let (low, high) = cloud.bounds();
+        let side = if ahead == 0 { "before" } else { "behind" };
+        let message = format!(
+            "no point is {side} this plane; the points of the body span {} to {} m",
+            rounded(&low),
+            rounded(&high)
+        );
+        Err(self.refuse(path, message, "move the plane into the body"))
     }
 
     /// With one straight pre-crack in 2D, its own direction is the one to follow.

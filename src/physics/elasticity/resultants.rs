@@ -70,12 +70,13 @@ fn through_cut<const D: usize>(
     normal: &Vector<D>,
     about: &Vector<D>,
 ) -> ForceAndMoment {
-    let (cloud, length) = (&pulled.body.cloud, norm(normal));
+    let cloud = &pulled.body.cloud;
     let reach = match &pulled.body.families {
         Families::Lattice(families) => families.longest(),
         Families::Cloud(_) => 2.0 * pulled.body.horizon,
     };
-    let height = |slot: usize| dot(&difference(&cloud.position(slot), point), normal) / length;
+    let normal = unit(normal);
+    let height = |slot: usize| dot(&difference(&cloud.position(slot), point), &normal);
     let on_the_plane = ON_THE_PLANE * cloud.spacing;
     sum(cloud.slots.len(), &|k| {
         let here = cloud.slots[k] as usize;
@@ -118,6 +119,13 @@ impl ForceAndMoment {
         let add = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|d| a[d] + b[d]);
         ForceAndMoment { force: add(self.force, other.force), moment: add(self.moment, other.moment) }
     }
+}
+
+/// Of length one, whatever the length was: squares of very small or large numbers would not do.
+fn unit<const D: usize>(a: &Vector<D>) -> Vector<D> {
+    let largest = a.iter().fold(0.0f64, |largest, a| largest.max(a.abs()));
+    let scaled = a.map(|a| a / largest);
+    scaled.map(|a| a / norm(&scaled))
 }
 
 /// The components that there are.
