@@ -245,3 +245,87 @@ fn a_run_of_unlike_halves_has_the_same_bits_on_any_number_of_threads() {
         assert_eq!(hash(1), hash(3), "{law}");
     }
 }
+
+/// Values of a field of numbers.
+fn numbers(simulation: &mut Simulation, name: &str) -> Vec<f64> {
+    match simulation.model.field(name).unwrap().values {
+        Values::Scalar(values) => values,
+        _ => panic!("{name} is a number"),
+    }
+}
+
+const HALVES: &str = "[materials.a]\nyoung = 1e9\ndensity = 1000\n[materials.b]\nyoung = 4e9\ndensity = 2000\n";
+
+#[test]
+fn rows_of_the_hybrid_scheme_are_of_one_material_and_move_as_bonds_do() {
+    for law in ["bond_based", "bond_based_linear"] {
+        let physics = format!("law = {{ {law} = {{}} }}\nmaterials = {{ a = \"left\", b = \"right\" }}\n");
+        let text = text(2, false, HALVES, &physics)
+            .replace("high = [0.032, 0.01]", "high = [0.032, 0.03]")
+            .replace("low = [-0.032, -0.01]", "low = [-0.032, -0.03]")
+            .replace("value = \"-1 + 100*x\"", "value = \"exp(-((x + 0.012)/0.005)^2)\"")
+            .replace("value = \"1\"", "value = \"exp(-((x + 0.012)/0.005)^2)\"")
+            .replace("end_time = 4e-6\ntime_step = 4e-8", "end_time = 1.5e-5\ntime_step = 1e-7");
+        let found: Vec<(Vec<f64>, f64)> = ["\"standard\"", "{ hybrid = { standard = [\"left_end\"] } }"]
+            .iter()
+            .map(|scheme| {
+                let text = text
+                    .replace("horizon_ratio = 3", &format!("horizon_ratio = 3\nscheme = {scheme}"))
+                    .replace("[sets]", "[sets]\nleft_end = { where = \"x < -0.03\" }");
+                let mut simulation = simulation(&text, &[]);
+                run(&mut simulation);
+                let positions = simulation.model.positions().to_vec();
+                let schemes = numbers(&mut simulation, "scheme");
+                let rows = schemes.iter().filter(|scheme| **scheme == 0.0).count();
+                let across = positions.iter().zip(&schemes).filter(|(x, scheme)| x[0].abs() < 3e-3 && **scheme == 0.0);
+                assert_eq!(across.count(), 0, "{law}: points that see both materials sum their bonds");
+                assert!(
+                    scheme.contains("standard\"") && !scheme.contains("hybrid") || rows > 1000,
+                    "{law}: {rows} rows"
+                );
+                let Some(Values::Vector(u)) = simulation.model.field("displacement").map(|field| field.values) else {
+                    panic!("displacements are vectors")
+                };
+                let balance = simulation.model.balance();
+                (u.iter().map(|u| u[0]).collect(), balance.kinetic + balance.strain + balance.damped)
+            })
+            .collect();
+        let [(bonds, energy), (mixed, other)] = &found[..] else { panic!("two runs") };
+        let largest = bonds.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
+        let error = bonds.iter().zip(mixed).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest;
+        // Rows have the moduli of the integral, bonds those of the lattice, some per cent apart at m = 3: so are the speeds of
+        // a pulse that has run two of its widths.
+        assert!(error < 0.1, "{law}: {error}");
+        // With what the damping of rows takes from so short a pulse, booked every 20 steps.
+        assert!((energy / other - 1.0).abs() < 0.02, "{law}: {energy} {other}");
+    }
+}
+
+#[test]
+fn cells_that_follow_the_solution_keep_their_material_and_its_mass() {
+    let physics = "law = { bond_based = {} }\nmaterials = { a = \"left\", b = \"right\" }\n\
+                   failure = { critical_stretch = { stretch = 0.01 } }\n";
+    let text = text(2, false, HALVES, physics).replace(
+        "[discretization]",
+        "[refinement]\nlevels = 1\nbuffer = 1\nevery_steps = 10\nrefine_where = \"abs(x - 3000*t) < 4e-3\"\n\
+         keep_where = \"0\"\n[discretization]",
+    );
+    let mut simulation = simulation(&text, &[]);
+    simulation.model.start();
+    let before = simulation.model.balance().momentum[0];
+    let (mut least, mut most) = (usize::MAX, 0);
+    while simulation.clock.step < simulation.n_steps {
+        simulation.model.step(&simulation.solver, &mut simulation.clock).unwrap();
+        let (positions, materials) = (simulation.model.positions().to_vec(), numbers(&mut simulation, "material"));
+        let densities = numbers(&mut simulation, "density");
+        for ((x, material), density) in positions.iter().zip(&materials).zip(&densities) {
+            let expected = if x[0] < 0.0 { (0.0, 1000.0) } else { (1.0, 2000.0) };
+            assert_eq!((*material, *density), expected, "{x:?}");
+        }
+        (least, most) = (least.min(positions.len()), most.max(positions.len()));
+    }
+    assert!(least > 1280 && most > least, "{least} {most}: cells are split and merged");
+    let balance = simulation.model.balance();
+    // Inner forces keep momentum, and so do splitting and merging, to the rounding of a thousand masses.
+    assert!((balance.momentum[0] - before).abs() < 1e-12 * balance.momentum_scale, "{balance:?}");
+}

@@ -164,6 +164,16 @@ impl Checker<'_> {
                     let path = |i: usize| format!("output[{k}].{kind}.fields[{i}]");
                     fields.iter().enumerate().map(|(i, field)| (path(i), field.name())).collect()
                 }
+                Output::Force(_) | Output::Cut(_) if diffusive => {
+                    let kind = if matches!(output, Output::Force(_)) { "force" } else { "cut" };
+                    let message = "what diffuses has no forces";
+                    self.error(
+                        &format!("output[{k}].{kind}"),
+                        message,
+                        "remove it; `reaction_<set>` of the history says what flows",
+                    );
+                    continue;
+                }
                 Output::History(_) | Output::CrackTip(_) | Output::Force(_) | Output::Cut(_) => Vec::new(),
             };
             for (path, field) in asked.into_iter().filter(|(_, field)| !known.contains(field)) {
