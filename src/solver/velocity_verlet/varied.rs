@@ -176,7 +176,8 @@ mod tests {
     fn unlike_inertia_is_a_force_over_it() {
         for n in [CHUNK + 3 * RUN + 5, 40] {
             // Powers of two, so that nothing is rounded; runs that are alike and runs that are not.
-            let relative: Vec<f64> = (0..n).map(|k| if k / RUN % 2 == 0 { 2.0 } else { [1.0, 4.0][k % 2] }).collect();
+            let relative: Vec<f64> =
+                (0..n).map(|k| if (k / RUN).is_multiple_of(2) { 2.0 } else { [1.0, 4.0][k % 2] }).collect();
             let inverse: Vec<f64> = relative.iter().map(|m| 1.0 / m).collect();
             let alike: Vec<bool> = relative.chunks(RUN).map(|run| run.iter().all(|m| *m == run[0])).collect();
             let by_place = RelativeInertia { relative: &relative, inverse: &inverse, alike: &alike };
