@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::model::{Case, Elasticity, Plane, Scheme};
+use super::super::model::{Case, Elasticity, Scheme};
 use super::Checker;
 use crate::expression::nearest;
 
@@ -89,20 +89,8 @@ fn elastic(checker: &mut Checker<'_>, case: &Case, elasticity: &Elasticity) {
         if law.is_state_based() {
             let poisson = material.poisson.or(parameters.poisson).or(library);
             checker.poisson(poisson, parameters.plane, dimension, &path);
-        } else if let Some(poisson) = material.poisson {
-            let fixed = match (dimension, parameters.plane) {
-                (1, _) => None,
-                (2, Some(Plane::Strain)) | (3, _) => Some((1.0 / 4.0, "1/4")),
-                _ => Some((1.0 / 3.0, "1/3")),
-            };
-            // 1e-3 lets 0.333 stand for 1/3.
-            if fixed.is_none_or(|(fixed, _)| (poisson - fixed).abs() > 1e-3) {
-                let message = match fixed {
-                    Some((_, name)) => format!("the bond-based law fixes the Poisson ratio at {name}"),
-                    None => "in 1D there is no Poisson ratio".into(),
-                };
-                checker.error(&format!("{path}.poisson"), message, "remove the key, or give that value");
-            }
+        } else {
+            checker.fixed_poisson(material.poisson, parameters.plane, dimension, &path);
         }
     }
     let several = elasticity.materials.len() > 1;

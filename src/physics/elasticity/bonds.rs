@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::State;
 use super::bond_forces::{BondForce, BondForces};
+use super::breaking::Breaking;
 use super::density::Density;
 use super::kernels::{Diagonal, DiagonalRow, Energy, Force, Spring};
 use super::material::{Material, On, RowBoundary};
@@ -14,7 +15,7 @@ use super::surface::{Shares, shares_of_bonds};
 use crate::discretization::{BondWeighting, BondWeights};
 use crate::execution::{BlockRow, BreakRule, Broken, Exec, Packs, Unbreakable};
 use crate::family::{Body, Bond, BondKernel, BondLaw, BondStates, Families};
-use crate::field::{Double, Number, components, components_mut, dot};
+use crate::field::{Double, Number, components, components_mut};
 use crate::geometry::lattice::BLOCK;
 use crate::physics::failure::CriticalStretch;
 use crate::visit::Visitor;
@@ -209,39 +210,6 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
 
     fn shares(&self, on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares {
         shares_of_bonds(on, scaling)
-    }
-}
-
-/// The critical stretch, and what is needed to know the energy that a broken bond takes.
-struct Breaking<'a, const D: usize, L: BondLaw<D>, F> {
-    failure: &'a CriticalStretch,
-    law: L,
-    displacement: [&'a [F]; D],
-    velocity: [&'a [F]; D],
-    dt: f64,
-    edge: Option<&'a RowBoundary<'a, D>>,
-}
-
-impl<const D: usize, L: BondLaw<D>, F: Number> BreakRule<D> for Breaking<'_, D, L, F> {
-    fn threshold(&self) -> f64 {
-        self.law.strain_at(self.failure.smallest())
-    }
-
-    fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
-        strain > self.law.strain_at(self.failure.of(here, there))
-            && self.edge.is_none_or(|edge| edge.may_break(here, there))
-    }
-
-    /// Half of w(η) + ½ f(η)·Δη, with η at the start of the step in which the bond breaks and Δη its change in the
-    /// step: what the bond held, and what it still took from the motion, since velocity Verlet kicks with its force at
-    /// the start of the step and no longer with that at the end. So the books balance whatever the step.
-    fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
-        let difference = |f: &[&[F]; D], d: usize| f[d][there].to_f64() - f[d][here].to_f64();
-        let change: [f64; D] = std::array::from_fn(|d| self.dt * difference(&self.velocity, d));
-        let before: [f64; D] = std::array::from_fn(|d| difference(&self.displacement, d) - change[d]);
-        let strain = self.law.strain(bond, &before);
-        let force = self.law.force(bond, &before, strain, [0.0; D]);
-        0.5 * (self.law.energy(bond, strain) + 0.5 * dot(&force, &change))
     }
 }
 

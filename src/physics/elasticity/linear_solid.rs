@@ -35,6 +35,7 @@ pub use moduli::Moduli;
 
 use super::State;
 use super::bond_forces::{BondForce, BondForces};
+use super::breaking::Breaking;
 use super::density::Density;
 use super::kernels::Energy;
 use super::laws::bond_based::{FORCE_SINGLE, STRETCH_SINGLE};
@@ -229,9 +230,9 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
         match on.failure.filter(|_| step.is_some()) {
             None => self.sum::<D, P>(on, &state.states, u, &mut now),
             Some(failure) => {
-                let law = self.law;
-                let rule = Breaking { failure, law, displacement: u, velocity: v, dt, edge, lost: Mutex::default() };
-                let (weights, kernel, states) = (&on.operator.weights, Extension(law), &mut state.states);
+                let breaking = Breaking { failure, law: self.law, displacement: u, velocity: v, dt, edge };
+                let rule = Listing { breaking, lost: Mutex::default() };
+                let (weights, kernel, states) = (&on.operator.weights, Extension(self.law), &mut state.states);
                 let broken =
                     on.exec.sum_bonds_and_break::<D, D, 1, P>(on.body, weights, states, u, [&mut now], &kernel, &rule);
                 lost = rule.lost.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -567,33 +568,25 @@ impl<const D: usize> BondKernel<D, 0, D, 1> for Diagonal {
     }
 }
 
-/// The critical stretch, and a list of what broke.
-struct Breaking<'a, const D: usize, B, F> {
-    failure: &'a CriticalStretch,
-    law: B,
-    displacement: [&'a [F]; D],
-    velocity: [&'a [F]; D],
-    dt: f64,
-    edge: Option<&'a RowBoundary<'a, D>>,
+/// What a step breaks, and a list of it.
+struct Listing<'a, const D: usize, B, F> {
+    breaking: Breaking<'a, D, B, F>,
     lost: Mutex<Vec<Lost>>,
 }
 
-impl<const D: usize, B: Stretch<D>, F: Number> BreakRule<D> for Breaking<'_, D, B, F> {
+impl<const D: usize, B: Stretch<D>, F: Number> BreakRule<D> for Listing<'_, D, B, F> {
     fn threshold(&self) -> f64 {
-        self.law.strain_at(self.failure.smallest())
+        self.breaking.threshold()
     }
 
     fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
-        strain > self.law.strain_at(self.failure.of(here, there))
-            && self.edge.is_none_or(|edge| edge.may_break(here, there))
+        self.breaking.breaks(here, there, strain)
     }
 
     /// Nothing yet: what a bond takes depends on all that its ends have lost, [`LinearSolid::released`].
     fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
-        let difference = |f: &[&[F]; D], d: usize| f[d][there].to_f64() - f[d][here].to_f64();
-        let change: [f64; D] = std::array::from_fn(|d| self.dt * difference(&self.velocity, d));
-        let start: [f64; D] = std::array::from_fn(|d| difference(&self.displacement, d) - change[d]);
-        let [stretch, grown] = self.law.change(bond, &start, &change);
+        let [start, change] = self.breaking.step(here, there);
+        let [stretch, grown] = self.breaking.law.change(bond, &start, &change);
         let weight = bond.weight * bond.length;
         let [start, end] = [stretch, stretch + grown].map(|s| weight * s);
         let lost = Lost { here: here as u32, there: there as u32, start, end, square: stretch * end };

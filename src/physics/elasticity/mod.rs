@@ -6,6 +6,7 @@
 mod adapt;
 mod bond_forces;
 pub mod bonds;
+mod breaking;
 pub mod density;
 pub mod discrete;
 pub mod hybrid;
