@@ -24,13 +24,6 @@ pub struct RelativeInertia<'a, T> {
     pub relative: &'a [T],
     /// 1/relative
     pub inverse: &'a [T],
-    /// Whether so many consecutive places have the same: of the places of each such run, the last may be shorter.
-    pub alike: &'a [bool],
-}
-
-impl<T> RelativeInertia<'_, T> {
-    /// Places in a run.
-    pub const RUN: usize = 16;
 }
 
 /// The same in the numbers that they are stored in, and what solvers need to know of them.

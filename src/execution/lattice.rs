@@ -214,7 +214,8 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         weights: Weights,
     ) -> f64 {
         let mut watch = V::splat(0.0);
-        let rows = if let Weights::Rows(first) = weights { first } else { 0 };
+        // One pointer for all that is read of an offset: a second one costs an instruction a pack.
+        let rows = self.view.rows.as_ptr().wrapping_add(if let Weights::Rows(first) = weights { first } else { 0 });
         let mixed = VARIED && !matches!(weights, Weights::Rows(_));
         let choice = if mixed { self.choice::<V>(weights) } else { Choice::default() };
         for part in 0..BLOCK / V::LANES {
@@ -231,11 +232,11 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                     for _ in 0..class.members {
                         // SAFETY: classes are ranges of offsets, and words and rows have one entry an offset.
                         unsafe {
-                            let mut bond =
-                                if mixed { self.varied::<V>(&choice, k, first) } else { self.bond::<V>(rows + k) };
+                            let row = &*rows.add(k);
+                            let mut bond = if mixed { self.varied(&choice, row, first) } else { plain(row) };
                             let mask = *words.get_unchecked(k) >> (part * V::LANES);
-                            let relative = self.relative::<V, I>(&self.input, k, first, &here, mask);
-                            let added = self.relative::<V, A>(&self.added, k, first, &own, mask);
+                            let relative = self.relative::<V, I>(&self.input, row.shift, first, &here, mask);
+                            let added = self.relative::<V, A>(&self.added, row.shift, first, &own, mask);
                             let strain = self.kernel.strain(&bond, &relative);
                             watch = watch.larger(strain);
                             if K::MEMORY {
@@ -296,9 +297,10 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                 let mask = *word >> (part * V::LANES);
                 // SAFETY: as in `sum_on`.
                 let strain = unsafe {
+                    let row = self.view.rows.get_unchecked(k);
                     let here = self.hold::<V, I>(&self.input, first);
-                    let relative = self.relative::<V, I>(&self.input, k, first, &here, mask);
-                    self.kernel.strain(&self.bond::<V>(k), &relative)
+                    let relative = self.relative::<V, I>(&self.input, row.shift, first, &here, mask);
+                    self.kernel.strain(&plain(row), &relative)
                 };
                 if strain.largest() <= threshold {
                     continue;
@@ -352,7 +354,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
     unsafe fn relative<V: Pack<P::Bond> + LoadEnds<P::Field>, const N: usize>(
         &self,
         values: &[&[P::Field]; N],
-        k: usize,
+        shift: isize,
         first: usize,
         here: &[V::Held; N],
         mask: u16,
@@ -360,7 +362,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         let mut relative = [V::splat(0.0); N];
         for c in 0..N {
             unsafe {
-                let there = values[c].as_ptr().add(first).offset(self.view.rows.get_unchecked(k).shift);
+                let there = values[c].as_ptr().add(first).offset(shift);
                 relative[c] = V::relative(V::hold(there), here[c], mask);
             }
         }
@@ -384,10 +386,15 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
         Choice { bits: Some(varied.bits(b)), factors: [factor([a, a]), factor([a, b]), factor([b, b])] }
     }
 
-    /// The bonds along offset `k` of consecutive slots, each with its own constant.
+    /// The bonds along an offset of consecutive slots, each with its own constant.
     #[inline(always)]
-    unsafe fn varied<V: Pack<P::Bond>>(&self, choice: &Choice<'_, V>, k: usize, first: usize) -> Bond<D, V> {
-        let shift = unsafe { self.view.rows.get_unchecked(k).shift };
+    unsafe fn varied<V: Pack<P::Bond>>(
+        &self,
+        choice: &Choice<'_, V>,
+        row: &Row<D, P::Bond>,
+        first: usize,
+    ) -> Bond<D, V> {
+        let shift = row.shift;
         if let Some(bits) = choice.bits {
             let window = |slot: usize| {
                 // SAFETY: the slots that an offset reaches lie between the guards, and so does the word behind.
@@ -398,7 +405,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             // Beside a joint most offsets lead to one side only. To ask for that costs more than it saves: nobody can predict
             // the answer.
             let [aa, ab, bb] = choice.factors;
-            return scaled(unsafe { self.bond(k) }, aa.with(ab, here ^ there).with(bb, here & there));
+            return scaled(plain(row), aa.with(ab, here ^ there).with(bb, here & there));
         }
         // SAFETY: there is a number for each slot, and those that an offset reaches are slots.
         let mut factor = unsafe {
@@ -413,25 +420,25 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             // SAFETY: a pack has at most as many lanes as a block has slots.
             factor = factor * unsafe { V::load(factors.as_ptr()) };
         }
-        scaled(unsafe { self.bond(k) }, factor)
+        scaled(plain(row), factor)
     }
+}
 
-    #[inline(always)]
-    unsafe fn bond<V: Pack<P::Bond>>(&self, k: usize) -> Bond<D, V> {
-        let row = unsafe { self.view.rows.get_unchecked(k) };
-        let mut xi = [V::splat(0.0); D];
-        for d in 0..D {
-            xi[d] = V::broadcast(row.xi[d]);
-        }
-        Bond {
-            xi,
-            length: V::broadcast(row.length),
-            inverse_square: V::broadcast(row.inverse_square),
-            weight: V::broadcast(row.weight),
-            spring: V::broadcast(row.spring),
-            moment: V::broadcast(row.moment),
-            memory: V::splat(0.0),
-        }
+/// The bonds along an offset, with the weight of its row.
+#[inline(always)]
+fn plain<const D: usize, B: Number, V: Pack<B>>(row: &Row<D, B>) -> Bond<D, V> {
+    let mut xi = [V::splat(0.0); D];
+    for d in 0..D {
+        xi[d] = V::broadcast(row.xi[d]);
+    }
+    Bond {
+        xi,
+        length: V::broadcast(row.length),
+        inverse_square: V::broadcast(row.inverse_square),
+        weight: V::broadcast(row.weight),
+        spring: V::broadcast(row.spring),
+        moment: V::broadcast(row.moment),
+        memory: V::splat(0.0),
     }
 }
 

@@ -12,14 +12,12 @@ pub struct Density<F> {
     /// ρ/ρ₀ by slot, and ρ₀/ρ; empty where all points have ρ₀.
     relative: Vec<F>,
     inverse: Vec<F>,
-    /// Of each run of slots whether they have the same.
-    alike: Vec<bool>,
 }
 
 impl<F: Number> Density<F> {
     /// Of all points, kg/m³.
     pub fn same(density: f64) -> Self {
-        Density { unit: density, relative: Vec::new(), inverse: Vec::new(), alike: Vec::new() }
+        Density { unit: density, relative: Vec::new(), inverse: Vec::new() }
     }
 
     /// ρ by slot, kg/m³; zero where there is no point.
@@ -28,27 +26,20 @@ impl<F: Number> Density<F> {
         if densities.iter().all(|&density| density == unit || density == 0.0) {
             return Density::same(unit);
         }
-        // A slot without a point is at rest whatever it weighs: as much as what is before it, so that runs are longer.
-        let mut last = 1.0;
-        let relative = densities.iter().map(|&density| {
-            if density > 0.0 {
-                last = density / unit;
-            }
-            last
-        });
+        // A slot without a point is at rest whatever it weighs.
+        let relative = densities.iter().map(|&density| if density > 0.0 { density / unit } else { 1.0 });
         Density::of(unit, relative.collect())
     }
 
     fn of(unit: f64, relative: Vec<f64>) -> Self {
-        let alike = relative.chunks(RelativeInertia::<F>::RUN).map(|run| run.iter().all(|m| *m == run[0])).collect();
         let inverse = relative.iter().map(|m| F::from_f64(1.0 / m)).collect();
-        Density { unit, relative: relative.into_iter().map(F::from_f64).collect(), inverse, alike }
+        Density { unit, relative: relative.into_iter().map(F::from_f64).collect(), inverse }
     }
 
     /// ρ/ρ₀ by slot, as solvers ask for it; None where all points have ρ₀.
     pub fn by_place(&self) -> Option<RelativeInertia<'_, F>> {
-        let Density { relative, inverse, alike, .. } = self;
-        (!self.is_same()).then_some(RelativeInertia { relative, inverse, alike })
+        let Density { relative, inverse, .. } = self;
+        (!self.is_same()).then_some(RelativeInertia { relative, inverse })
     }
 
     /// The same, but so inert that nothing moves it where `moves` does not hold.
@@ -59,7 +50,7 @@ impl<F: Number> Density<F> {
 
     /// Bytes.
     pub fn memory(&self) -> usize {
-        size_of_val(&self.relative[..]) + size_of_val(&self.inverse[..]) + self.alike.len()
+        size_of_val(&self.relative[..]) + size_of_val(&self.inverse[..])
     }
 
     /// kg/m³

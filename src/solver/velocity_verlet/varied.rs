@@ -1,5 +1,4 @@
-//! Velocity Verlet where inertia differs from place to place. Runs of places that have the same are told so, and spare the
-//! memory that as many numbers would have to be fetched from.
+//! Velocity Verlet where inertia differs from place to place.
 
 use rayon::prelude::*;
 
@@ -7,9 +6,6 @@ use super::{CHUNK, Drift, Kick, LANES, unless_below};
 use crate::execution::{Sweep, wide};
 use crate::field::Number;
 use crate::unknown::RelativeInertia;
-
-const RUN: usize = RelativeInertia::<f64>::RUN;
-const _: () = assert!(CHUNK.is_multiple_of(RUN) && RUN.is_multiple_of(LANES));
 
 /// Part of a component.
 struct Part<'a, T> {
@@ -29,13 +25,12 @@ fn parts<'a, T, B>(
     let components = velocity.chunks_mut(n).zip(rate.chunks(n));
     let all = components.flat_map(|(velocity, rate)| {
         let inertia = by_place.relative.chunks(CHUNK).zip(by_place.inverse.chunks(CHUNK));
-        let inertia = inertia.zip(by_place.alike.chunks(CHUNK / RUN));
         velocity.chunks_mut(CHUNK).zip(rate.chunks(CHUNK)).zip(inertia)
     });
-    let part = |((velocity, rate), ((relative, inverse), alike))| Part {
+    let part = |((velocity, rate), (relative, inverse))| Part {
         velocity,
         rate,
-        inertia: RelativeInertia { relative, inverse, alike },
+        inertia: RelativeInertia { relative, inverse },
     };
     all.map(part).zip(beside).collect()
 }
@@ -92,10 +87,17 @@ impl<T: Number> Sweep for LastKick<'_, T> {
 
     #[inline(always)]
     fn run(self) -> f64 {
+        let LastKick { kick, velocity, rate, inertia: RelativeInertia { relative, inverse } } = self;
         let mut squares = [0.0; LANES];
-        let [relative, inverse] = [self.inertia.relative, self.inertia.inverse];
-        for (k, (v, f)) in self.velocity.iter_mut().zip(self.rate).enumerate() {
-            *v = kicked(&self.kick, *v, *f, relative[k], inverse[k], &mut squares[k % LANES]);
+        let ((vs, v), (fs, f)) = (velocity.as_chunks_mut::<LANES>(), rate.as_chunks::<LANES>());
+        let ((ms, m), (is, i)) = (relative.as_chunks::<LANES>(), inverse.as_chunks::<LANES>());
+        for (((v, f), m), i) in vs.iter_mut().zip(fs).zip(ms).zip(is) {
+            for k in 0..LANES {
+                v[k] = kicked(&kick, v[k], f[k], [m[k], i[k]], &mut squares[k]);
+            }
+        }
+        for k in 0..v.len() {
+            v[k] = kicked(&kick, v[k], f[k], [m[k], i[k]], &mut squares[k]);
         }
         squares.iter().sum()
     }
@@ -114,52 +116,44 @@ impl<T: Number, const PENDING: bool> Sweep for Pass<'_, T, PENDING> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Pass { kick, by, part: Part { velocity, rate, inertia }, value } = self;
+        let Pass { kick, by, part: Part { velocity, rate, inertia: RelativeInertia { relative, inverse } }, value } = self;
         let mut squares = [0.0; LANES];
-        let ((us, u), (vs, v)) = (value.as_chunks_mut::<RUN>(), velocity.as_chunks_mut::<RUN>());
-        let ((fs, f), (ms, m)) = (rate.as_chunks::<RUN>(), inertia.relative.as_chunks::<RUN>());
-        let (is, i) = inertia.inverse.as_chunks::<RUN>();
-        for ((((u, v), f), (m, i)), alike) in us.iter_mut().zip(vs).zip(fs).zip(ms.iter().zip(is)).zip(inertia.alike) {
-            if *alike {
-                let (m, i) = (m[0], i[0]);
-                for k in 0..RUN {
-                    Self::one(&kick, by, &mut u[k], &mut v[k], f[k], [m, i], &mut squares[k % LANES]);
-                }
-            } else {
-                for k in 0..RUN {
-                    Self::one(&kick, by, &mut u[k], &mut v[k], f[k], [m[k], i[k]], &mut squares[k % LANES]);
-                }
-            }
+        let ((us, u), (vs, v)) = (value.as_chunks_mut::<LANES>(), velocity.as_chunks_mut::<LANES>());
+        let (fs, f) = rate.as_chunks::<LANES>();
+        let ((ms, m), (is, i)) = (relative.as_chunks::<LANES>(), inverse.as_chunks::<LANES>());
+        for ((((u, v), f), m), i) in us.iter_mut().zip(vs).zip(fs).zip(ms).zip(is) {
+            Self::some(&kick, by, u, v, [f, m, i], &mut squares);
         }
-        for k in 0..u.len() {
-            Self::one(&kick, by, &mut u[k], &mut v[k], f[k], [m[k], i[k]], &mut squares[k % LANES]);
-        }
+        Self::some(&kick, by, u, v, [f, m, i], &mut squares);
         squares.iter().sum()
     }
 }
 
 impl<T: Number, const PENDING: bool> Pass<'_, T, PENDING> {
+    /// Of at most as many places as there are lanes. That nothing else is where `u` and `v` are is known of arguments alone;
+    /// without it the compiler makes no vectors of this.
     #[inline(always)]
-    fn one(
+    fn some(
         kick: &Kick<T>,
         [keep, dt, still]: [T; 3],
-        u: &mut T,
-        v: &mut T,
-        f: T,
-        [relative, inverse]: [T; 2],
-        square: &mut f64,
+        u: &mut [T],
+        v: &mut [T],
+        [f, relative, inverse]: [&[T]; 3],
+        squares: &mut [f64; LANES],
     ) {
-        if PENDING {
-            *v = kicked(kick, *v, f, relative, inverse, square);
+        for k in 0..u.len() {
+            if PENDING {
+                v[k] = kicked(kick, v[k], f[k], [relative[k], inverse[k]], &mut squares[k]);
+            }
+            v[k] = unless_below(kick.slow, keep * v[k] + kick.factor * (f[k] * inverse[k]));
+            u[k] = unless_below(still, u[k] + dt * v[k]);
         }
-        *v = unless_below(kick.slow, keep * *v + kick.factor * (f * inverse));
-        *u = unless_below(still, *u + dt * *v);
     }
 }
 
 /// The last kick of a step at a place; adds v² ρ/ρ₀.
 #[inline(always)]
-fn kicked<T: Number>(kick: &Kick<T>, v: T, f: T, relative: T, inverse: T, square: &mut f64) -> T {
+fn kicked<T: Number>(kick: &Kick<T>, v: T, f: T, [relative, inverse]: [T; 2], square: &mut f64) -> T {
     let v = unless_below(kick.slow, (v + kick.factor * (f * inverse)) * kick.after);
     *square += v.to_f64() * v.to_f64() * relative.to_f64();
     v
@@ -174,13 +168,11 @@ mod tests {
     /// Places of unlike inertia under a constant force move as places of one inertia under the force over theirs.
     #[test]
     fn unlike_inertia_is_a_force_over_it() {
-        for n in [CHUNK + 3 * RUN + 5, 40] {
-            // Powers of two, so that nothing is rounded; runs that are alike and runs that are not.
-            let relative: Vec<f64> =
-                (0..n).map(|k| if (k / RUN).is_multiple_of(2) { 2.0 } else { [1.0, 4.0][k % 2] }).collect();
+        for n in [CHUNK + 3 * LANES + 5, 40] {
+            // Powers of two, so that nothing is rounded.
+            let relative: Vec<f64> = (0..n).map(|k| [1.0, 2.0, 4.0][k % 3]).collect();
             let inverse: Vec<f64> = relative.iter().map(|m| 1.0 / m).collect();
-            let alike: Vec<bool> = relative.chunks(RUN).map(|run| run.iter().all(|m| *m == run[0])).collect();
-            let by_place = RelativeInertia { relative: &relative, inverse: &inverse, alike: &alike };
+            let by_place = RelativeInertia { relative: &relative, inverse: &inverse };
             let flat = |of: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..2 * n).map(of).collect() };
             let force = flat(&|k| ((k * 7919) % 101) as f64 - 50.0);
             let over = flat(&|k| force[k] * inverse[k % n]);
