@@ -72,17 +72,25 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             // of a point and its slot belong to the chunk that owns the point.
             unsafe {
                 let scale = self.scale(point);
-                let mut largest = self.small(point, scale);
+                let varied = scale.is_none();
+                let mut largest = self.small(point, varied);
                 if !R::NEVER && largest > threshold {
                     let here = self.break_bonds(point, rule);
                     if here.bonds > 0 {
                         broken.bonds += here.bonds;
                         broken.energy += here.energy;
-                        largest = self.small(point, scale);
+                        largest = self.small(point, varied);
                     }
                 }
                 if K::TWO_FORMS && largest > K::SMALL {
-                    self.sum::<false, false>(point, scale);
+                    self.sum::<false, false>(point, varied);
+                }
+                // Behind the loops, so that those of one material hold no number more.
+                if let Some(scale) = scale.filter(|&scale| scale != 1.0) {
+                    for output in &self.output {
+                        let sum = &mut *output.0.add(point);
+                        *sum = P::Field::from_f64(sum.to_f64() * scale);
+                    }
                 }
             }
         }
@@ -100,25 +108,26 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
 
     /// # Safety
     /// As of [`Sum::sum`].
-    unsafe fn small(&self, point: usize, scale: Option<f64>) -> f64 {
+    unsafe fn small(&self, point: usize, varied: bool) -> f64 {
         unsafe {
-            if K::EVERY_STEP && self.profile.plain && scale.is_some() {
-                self.sum::<true, true>(point, scale)
+            if K::EVERY_STEP && self.profile.plain && !varied {
+                self.sum::<true, true>(point, varied)
             } else {
-                self.sum::<true, false>(point, scale)
+                self.sum::<true, false>(point, varied)
             }
         }
     }
 
     compiled!(
         sum, sum_on, sum_avx2, sum_avx512 if K::EVERY_STEP,
-        [with SMALL: bool, PLAIN: bool], (point: usize, scale: Option<f64>), f64
+        [with SMALL: bool, PLAIN: bool], (point: usize, varied: bool), f64
     );
     compiled!(break_bonds, break_on, break_avx2, break_avx512 if false, [rule R: BreakRule<D>], (point: usize, rule: &R), Broken);
 
-    /// Sums one family into the output, in the small or the exact form, with `PLAIN` weights or any; returns the largest |strain| of its whole bonds.
+    /// Sums one family into the output, in the small or the exact form, with `PLAIN` weights or any, which differ by more
+    /// than volumes if they are `varied`; returns the largest |strain| of its whole bonds.
     #[inline(always)]
-    unsafe fn sum_on<V, const SMALL: bool, const PLAIN: bool>(&self, point: usize, scale: Option<f64>) -> f64
+    unsafe fn sum_on<V, const SMALL: bool, const PLAIN: bool>(&self, point: usize, varied: bool) -> f64
     where
         V: Pack<P::Bond> + LoadEnds<P::Field> + BondVectors<P::Site>,
     {
@@ -133,7 +142,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
             for part in 0..GROUP / V::LANES {
                 let mask = word >> (part * V::LANES);
                 let (mut bond, relative, added) =
-                    unsafe { self.bond::<V, PLAIN>(point, group, part, &here, mask, scale.is_none()) };
+                    unsafe { self.bond::<V, PLAIN>(point, group, part, &here, mask, varied) };
                 let strain = self.kernel.strain(&bond, &relative);
                 watch = watch.larger(strain);
                 if K::MEMORY {
@@ -171,7 +180,7 @@ impl<const D: usize, const I: usize, const A: usize, const O: usize, P: Packs, K
                     sums[part][c] = sums[part][c] + sums[part + parts][c];
                 }
             }
-            let total = sums[0][c].total().to_f64() * scale.unwrap_or(1.0);
+            let total = sums[0][c].total().to_f64();
             // SAFETY: `point` belongs to this chunk alone and the field has the length of the cloud.
             unsafe { *self.output[c].0.add(point) = P::Field::from_f64(total) };
         }

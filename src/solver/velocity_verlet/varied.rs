@@ -116,7 +116,8 @@ impl<T: Number, const PENDING: bool> Sweep for Pass<'_, T, PENDING> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Pass { kick, by, part: Part { velocity, rate, inertia: RelativeInertia { relative, inverse } }, value } = self;
+        let Pass { kick, by, part: Part { velocity, rate, inertia: RelativeInertia { relative, inverse } }, value } =
+            self;
         let mut squares = [0.0; LANES];
         let ((us, u), (vs, v)) = (value.as_chunks_mut::<LANES>(), velocity.as_chunks_mut::<LANES>());
         let (fs, f) = rate.as_chunks::<LANES>();
