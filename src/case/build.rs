@@ -7,6 +7,8 @@ mod hybrid;
 mod images;
 mod materials;
 mod outputs;
+#[cfg(test)]
+mod ties;
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::{Images, Lattice, PointSets, Shape, curve};
+use super::{Images, Lattice, PointSets, Shape, TIE, curve};
 use crate::field::Vector;
 use crate::parallel;
 
@@ -32,7 +32,7 @@ pub struct Cloud<const D: usize> {
 }
 
 impl<const D: usize> Cloud<D> {
-    /// Fills `shape` with cubic cells whose centres lie inside it. The box of cells is centred on the shape's bounds;
+    /// Fills `shape` with cubic cells whose centres lie inside it or on its border. The box of cells is centred on the shape's bounds;
     /// `reach` is the largest distance of a neighbour in cells.
     ///
     /// A [`Shape::Box`] is filled whole, without asking each centre, so that rounding cannot lose a row.
@@ -42,7 +42,7 @@ impl<const D: usize> Cloud<D> {
         let whole = matches!(shape, Shape::Box { .. });
         let mut slots = Vec::new();
         for_each_cell(counts, |cell| {
-            if whole || shape.contains(&lattice.position(cell)) {
+            if whole || shape.holds(&lattice.position(cell), TIE * spacing) {
                 slots.push(lattice.slot(cell) as u32);
             }
         });
@@ -148,9 +148,23 @@ impl<const D: usize> Cloud<D> {
         range.map(move |k| if lattice { self.slots[k] as usize } else { k })
     }
 
+    /// Length below which things touch the point in `slot`, m: [`TIE`] of the side of its cell.
+    pub fn tie(&self, slot: usize) -> f64 {
+        match &self.arrangement {
+            Arrangement::Lattice(lattice) => TIE * lattice.spacing,
+            Arrangement::Scattered { volumes, .. } => TIE * volumes[slot].powf(1.0 / D as f64),
+        }
+    }
+
     /// Slots of the points for which `inside` holds, ascending.
     pub fn select(&self, mut inside: impl FnMut(&Vector<D>) -> bool) -> Vec<u32> {
-        self.stored(0..self.n_points()).filter(|&slot| inside(&self.position(slot))).map(|slot| slot as u32).collect()
+        self.select_with_ties(|x, _| inside(x))
+    }
+
+    /// The same, of a question that needs to know the [tie](Self::tie) of a point.
+    pub fn select_with_ties(&self, mut inside: impl FnMut(&Vector<D>, f64) -> bool) -> Vec<u32> {
+        let holds = |slot: &usize| inside(&self.position(*slot), self.tie(*slot));
+        self.stored(0..self.n_points()).filter(holds).map(|slot| slot as u32).collect()
     }
 
     /// Slots of points, ascending.
@@ -164,7 +178,9 @@ impl<const D: usize> Cloud<D> {
 /// Lower corner (m) and number of the cells of the box that [`Cloud::lattice`] fills.
 pub fn cells_of<const D: usize>(shape: &Shape<D>, spacing: f64) -> (Vector<D>, [usize; D]) {
     let (low, high) = shape.bounds();
-    let counts: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round().max(1.0) as usize);
+    // Half a cell more is a tie as well.
+    let whole = |d: usize| ((high[d] - low[d]) / spacing + 0.5 + TIE).floor().max(1.0) as usize;
+    let counts: [usize; D] = std::array::from_fn(whole);
     let corner = std::array::from_fn(|d| {
         let centre = 0.5 * (low[d] + high[d]);
         // An exact fit keeps the shape's own corner: no rounding from the centre.

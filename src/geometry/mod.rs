@@ -8,6 +8,8 @@ pub mod lattice;
 mod polygon;
 pub mod sets;
 pub mod shapes;
+pub mod surface;
+pub mod tie;
 
 pub use cloud::{Arrangement, Cloud, for_each_cell};
 pub use cracks::Crack;
@@ -15,3 +17,5 @@ pub use images::{Ends, Images, Mirror, Parity};
 pub use lattice::Lattice;
 pub use sets::PointSets;
 pub use shapes::Shape;
+pub use surface::Piece;
+pub use tie::TIE;

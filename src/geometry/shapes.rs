@@ -149,7 +149,12 @@ impl<const D: usize> Shape<D> {
 
     /// Whether the point lies inside the shape or on its boundary.
     pub fn contains(&self, x: &Vector<D>) -> bool {
-        self.signed_distance(x) <= 0.0
+        self.holds(x, 0.0)
+    }
+
+    /// The same, and whether it lies outside by less than a `tie`, m.
+    pub fn holds(&self, x: &Vector<D>, tie: f64) -> bool {
+        self.signed_distance(x) <= tie
     }
 
     /// Distance to the boundary, negative inside.

@@ -67,7 +67,19 @@ pub struct Report {
     pub hybrid: Option<Hybrid>,
     /// Of static solvers, the one that was not finished included; empty for others.
     pub load_steps: Vec<LoadStep>,
+    /// In the order of the outputs.
+    pub probes: Vec<Probed>,
     pub state_hash: String,
+}
+
+/// Where a probe looks.
+#[derive(Debug, Clone, Serialize, PartialEq)]
+pub struct Probed {
+    /// As the case says, m.
+    pub at: Vec<f64>,
+    /// The point nearest to that, and its position, m; at the end, where points are replaced.
+    pub point: usize,
+    pub position: Vec<f64>,
 }
 
 /// What diffused.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::source::{Points, Source};
 use crate::field::{Field, difference, norm};
+use crate::geometry::{TIE, tie};
 use crate::physics::{ForceAndMoment, Resultant};
 use crate::solver::Clock;
 
@@ -36,12 +37,19 @@ impl FieldRequest {
         FieldRequest { resultant: Some(of), ..FieldRequest::default() }
     }
 
-    /// Finds the place among the points of a body.
-    pub fn find(&mut self, positions: &[[f64; 3]]) {
+    /// Finds the place among the points of a body: the nearest, by the rule of [ties](tie::nearest).
+    pub fn find(&mut self, points: &Points) {
         self.point = self.at.and_then(|at| {
-            let far = |k: &usize| norm(&difference(&positions[*k], &at));
-            (0..positions.len()).min_by(|a, b| far(a).total_cmp(&far(b)))
+            let all = points.positions.iter().enumerate().map(|(k, x)| (k, norm(&difference(x, &at)), *x));
+            let (nearest, ..) = all.clone().min_by(|a, b| a.1.total_cmp(&b.1))?;
+            let side = points.sizes.get(nearest).copied().unwrap_or(points.facts.spacing);
+            tie::nearest(all, TIE * side)
         });
+    }
+
+    /// The place that is wanted (m), and the point that stands for it.
+    pub fn found(&self) -> Option<([f64; 3], usize)> {
+        self.at.zip(self.point)
     }
 }
 

@@ -12,7 +12,7 @@ pub use model::Model;
 use crate::error::{Error, Result};
 use crate::output::history::History;
 use crate::output::report::{
-    Diffusion, Energy, Hybrid, Refinement, Report, StretchRatio, Tip, WallSeconds, peak_memory,
+    Diffusion, Energy, Hybrid, Probed, Refinement, Report, StretchRatio, Tip, WallSeconds, peak_memory,
 };
 use crate::output::snapshot::FieldCache;
 use crate::output::source::{Points, Source};
@@ -150,9 +150,17 @@ impl Simulation {
             (None, true) => "interrupted",
             (None, false) => "done",
         };
+        let dimension = self.model.facts().dimension;
+        let probed = desk.orders.iter().filter_map(|order| order.wants.found()).map(|(at, point)| Probed {
+            at: at[..dimension].to_vec(),
+            point,
+            position: self.model.positions()[point][..dimension].to_vec(),
+        });
+        let probes = probed.collect();
         let (output, writing) = desk.close()?;
         let stepping = begin.elapsed().as_secs_f64() - output;
-        let report = self.report(status, WallSeconds { setup: self.setup_seconds, stepping, output, writing });
+        let wall = WallSeconds { setup: self.setup_seconds, stepping, output, writing };
+        let report = Report { probes, ..self.report(status, wall) };
         report.write(&self.folder.join("report.json"))?;
         match stop {
             Some(error) => Err(error),
@@ -189,7 +197,7 @@ impl Simulation {
         let places = desk.orders.iter().any(|order| order.wants.at.is_some());
         if places && desk.points.as_ref().is_none_or(|known| !Arc::ptr_eq(known, self.model.points())) {
             desk.points = Some(self.model.points().clone());
-            desk.orders.iter_mut().for_each(|order| order.wants.find(self.model.positions()));
+            desk.orders.iter_mut().for_each(|order| order.wants.find(self.model.points()));
         }
         let mut look = FieldCache::new(&mut *self.model, clock);
         let row = self.history.row(&mut look, &clock, last);
@@ -299,6 +307,7 @@ impl Simulation {
                 rayleigh_speed: elastic.and_then(|e| e.rayleigh_speed),
             }),
             load_steps: self.model.load_steps().to_vec(),
+            probes: Vec::new(),
             state_hash: self.model.hash(),
         }
     }

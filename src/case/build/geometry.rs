@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::family::Rule;
 use crate::field::Vector;
-use crate::geometry::{Arrangement, Cloud, Crack, Shape};
+use crate::geometry::{Arrangement, Cloud, Crack, Shape, TIE};
 use crate::physics::elasticity::{Adaptation, INDICATORS};
 use crate::refinement::{Cells, Transition};
 
@@ -146,7 +146,9 @@ impl<const D: usize> Builder<'_, D> {
         let regions = (refinement.zones.iter().enumerate())
             .map(|(k, zone)| {
                 let path = format!("refinement.zones[{k}].region");
-                Ok((self.region(&zone.region, shape, &path)?, zone.level))
+                // Cells of that level are meant.
+                let tie = TIE * cloud.spacing / f64::from(1u32 << zone.level);
+                Ok((self.region(&zone.region, shape, &path)?, zone.level, tie))
             })
             .collect::<Result<Vec<_>>>()?;
         let mut adaptation = Adaptation {
@@ -170,8 +172,10 @@ impl<const D: usize> Builder<'_, D> {
             cracks: cracks.to_vec(),
             tolerance: 1e-9 * cloud.spacing / f64::from(1u32 << refinement.levels),
         };
-        adaptation
-            .prepare(|x| regions.iter().filter(|(inside, _)| inside(x)).map(|(_, level)| *level).max().unwrap_or(0));
+        adaptation.prepare(|x| {
+            let inside = regions.iter().filter(|(inside, _, tie)| inside(x, *tie));
+            inside.map(|(_, level, _)| *level).max().unwrap_or(0)
+        });
         let ball = [2.0, std::f64::consts::PI, 4.0 / 3.0 * std::f64::consts::PI][D - 1];
         // Neighbours, weights, fractions and bits; fields, sites, and the same again while points are replaced.
         let per_point = 15.0 * ball * (adaptation.ratio + 1.0).powi(D as i32) + 8.0 * (6 * D + 16) as f64;
@@ -263,7 +267,7 @@ impl<const D: usize> Builder<'_, D> {
                 return Err(self.refuse(&path, "the points' file has a set of this name too", "rename one of them"));
             }
             let inside = self.region(region, shape, &path)?;
-            let slots = cloud.select(|x| inside(x));
+            let slots = cloud.select_with_ties(|x, tie| inside(x, tie));
             if slots.is_empty() {
                 let (low, high) = cloud.bounds();
                 let message = format!(
@@ -282,26 +286,27 @@ impl<const D: usize> Builder<'_, D> {
         Ok(())
     }
 
+    /// Whether a place is in a region, but for a tie, m.
     #[allow(clippy::type_complexity)] // a predicate over points
     pub(super) fn region<'s>(
         &self,
         region: &Region,
         shape: Option<&'s Shape<D>>,
         path: &str,
-    ) -> Result<Box<dyn Fn(&Vector<D>) -> bool + 's>> {
+    ) -> Result<Box<dyn Fn(&Vector<D>, f64) -> bool + 's>> {
         Ok(match region {
             Region::Box { low, high } => {
                 let (low, high) = (vector::<D>(low), vector::<D>(high));
-                Box::new(move |x| (0..D).all(|d| x[d] >= low[d] && x[d] <= high[d]))
+                Box::new(move |x, tie| (0..D).all(|d| x[d] >= low[d] - tie && x[d] <= high[d] + tie))
             }
             Region::Inside(shape) => {
                 let shape = shape_of::<D>(shape);
                 shape.validate().map_err(|e| self.refuse(&format!("{path}.inside"), e, ""))?;
-                Box::new(move |x| shape.contains(x))
+                Box::new(move |x, tie| shape.holds(x, tie))
             }
             Region::Where(formula) => {
                 let expression = self.expression(formula)?;
-                Box::new(move |x| {
+                Box::new(move |x, _| {
                     let x = crate::field::embed(x);
                     expression.evaluate(&[x[0], x[1], x[2], 0.0]) != 0.0
                 })
@@ -311,19 +316,19 @@ impl<const D: usize> Builder<'_, D> {
                     return Err(self.refuse(path, "a layer needs the surface of `geometry.shape`", "use `where`"));
                 };
                 let thickness = *thickness;
-                Box::new(move |x| shape.signed_distance(x) >= -thickness)
+                Box::new(move |x, tie| shape.signed_distance(x) >= -thickness - tie)
             }
             Region::All(regions) => {
                 let all = regions.iter().map(|r| self.region(r, shape, path)).collect::<Result<Vec<_>>>()?;
-                Box::new(move |x| all.iter().all(|inside| inside(x)))
+                Box::new(move |x, tie| all.iter().all(|inside| inside(x, tie)))
             }
             Region::Any(regions) => {
                 let any = regions.iter().map(|r| self.region(r, shape, path)).collect::<Result<Vec<_>>>()?;
-                Box::new(move |x| any.iter().any(|inside| inside(x)))
+                Box::new(move |x, tie| any.iter().any(|inside| inside(x, tie)))
             }
             Region::Not(region) => {
                 let inside = self.region(region, shape, path)?;
-                Box::new(move |x| !inside(x))
+                Box::new(move |x, tie| !inside(x, tie))
             }
         })
     }

@@ -169,18 +169,18 @@ pub enum Axis {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Region {
-    /// Points between two corners, both included.
+    /// Points between two corners, those on the border included; nothing that is nearer than a fortieth of a cell is outside.
     Box {
         #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
         low: Vec<f64>,
         #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
         high: Vec<f64>,
     },
-    /// Points in a shape.
+    /// Points in a shape, those on its border included, as of a box.
     Inside(Shape),
     /// Points where a formula of the reference position is true (not zero), such as `"y > 0.02 - h"`.
     Where(#[schemars(extend("x-expression" = ["x", "y", "z"]))] Formula),
-    /// Points of the body within `thickness` of its surface.
+    /// Points of the body within `thickness` of its surface, that distance included, as of a box.
     Layer {
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0))]
         thickness: f64,

@@ -137,7 +137,7 @@ pub struct History {
 pub struct Probe {
     /// The table is written as `probe_<name>.csv`.
     pub name: String,
-    /// A place; the nearest point is probed.
+    /// A place; the nearest point is probed, the lowest of several. `report.json` says which.
     #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
     pub at: Vec<f64>,
     /// Fields; displacement and velocity if not given, of diffusion the concentration.
