@@ -3,6 +3,7 @@
 pub mod cloud;
 pub mod cracks;
 pub mod curve;
+mod fit;
 pub mod images;
 pub mod lattice;
 mod polygon;
@@ -13,6 +14,7 @@ pub mod tie;
 
 pub use cloud::{Arrangement, Cloud, for_each_cell};
 pub use cracks::Crack;
+pub use fit::{Fits, sum_of_shares};
 pub use images::{Ends, Images, Mirror, Parity};
 pub use lattice::Lattice;
 pub use sets::PointSets;
