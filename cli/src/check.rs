@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use bondwise::Result;
 use bondwise::case::build::{Options, available_memory, load};
-use bondwise::output::source::{DiffusiveSummary, ElasticSummary, MaterialSummary, PhysicsSummary};
+use bondwise::output::source::{DiffusiveSummary, ElasticSummary, LoadSummary, MaterialSummary, PhysicsSummary};
 
 use crate::{CaseArgs, on_threads, say};
 
@@ -29,6 +29,7 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
         for leg in &simulation.stages_to_come {
             say!("then              {} of {:.6e} s, to t = {:.6e} s", leg.n_steps, leg.dt, leg.ends);
         }
+        loads(&simulation.loads, facts.dimension);
         let mib = |bytes: u64| bytes as f64 / 1048576.0;
         say!("memory            {:.1} MiB for fields and bonds", mib(facts.memory));
         if let Some(free) = available_memory() {
@@ -42,6 +43,35 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
         histogram(&families, alone);
         Ok(ExitCode::SUCCESS)
     })?
+}
+
+/// What each load adds up to.
+fn loads(list: &[LoadSummary], dimension: usize) {
+    for load in list {
+        let on = if load.on.is_empty() { String::new() } else { format!(" on `{}`", load.on) };
+        let area =
+            load.area.map_or(String::new(), |area| format!(", area {area:.6e} {}", ["", "m", "m^2"][dimension - 1]));
+        if load.kind == "flux" || load.kind == "source" {
+            say!(
+                "{} (condition {}){on}{area}: {:.6e} enter in a second at t = {} s",
+                load.kind,
+                load.condition,
+                load.force[0],
+                load.time
+            );
+            continue;
+        }
+        let list = |x: &[f64]| x.iter().map(|x| format!("{x:.6e}")).collect::<Vec<_>>().join(", ");
+        let (force, about) = (list(&load.force[..dimension]), [0..0, 2..3, 0..3][dimension - 1].clone());
+        let moment =
+            if about.is_empty() { String::new() } else { format!(", moment ({}) N m", list(&load.moment[about])) };
+        say!(
+            "{} (condition {}){on}{area}: force ({force}) N{moment} at t = {} s",
+            load.kind,
+            load.condition,
+            load.time
+        );
+    }
 }
 
 /// A table of materials, if there are several.

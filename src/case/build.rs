@@ -7,11 +7,14 @@ mod hybrid;
 mod images;
 mod materials;
 mod outputs;
+mod surfaces;
 #[cfg(test)]
 mod ties;
 
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::bundled;
@@ -32,7 +35,7 @@ use crate::output::history::History;
 use crate::output::pictures::Pictures;
 use crate::output::probe::Probe;
 use crate::output::schedule::Schedule;
-use crate::output::source::{BodySummary, ElasticSummary, PhysicsSummary};
+use crate::output::source::{BodySummary, ElasticSummary, LoadSummary, PhysicsSummary};
 use crate::output::writer::Output as Written;
 use crate::physics::Physics;
 use crate::physics::elasticity::laws::Law;
@@ -86,9 +89,9 @@ pub fn build(case: &Located<Case>, options: &Options) -> Result<Simulation> {
         return Err(refuse(case, errors));
     }
     let mut simulation = match case.value.case.dimension {
-        1 => Builder::<1> { case, options }.simulation(),
-        2 => Builder::<2> { case, options }.simulation(),
-        _ => Builder::<3> { case, options }.simulation(),
+        1 => Builder::<1> { case, options, loads: RefCell::default() }.simulation(),
+        2 => Builder::<2> { case, options, loads: RefCell::default() }.simulation(),
+        _ => Builder::<3> { case, options, loads: RefCell::default() }.simulation(),
     }?;
     simulation.setup_seconds = begin.elapsed().as_secs_f64();
     Ok(simulation)
@@ -101,6 +104,8 @@ fn refuse(case: &Located<Case>, list: Vec<Diagnostic>) -> Error {
 struct Builder<'a, const D: usize> {
     case: &'a Located<Case>,
     options: &'a Options,
+    /// What loads add up to, as they are built.
+    loads: RefCell<Vec<LoadSummary>>,
 }
 
 impl<const D: usize> Builder<'_, D> {
@@ -267,6 +272,10 @@ impl<const D: usize> Builder<'_, D> {
         let (mut constraints, mut terms) = (Vec::new(), self.mirror_forces(&elasticity.body.cloud));
         for (k, condition) in case.conditions.iter().enumerate() {
             let Elasticity { body, state, .. } = &mut elasticity;
+            if let Some(load) = condition.load.as_ref().filter(|load| load.is_placed()) {
+                self.load(k, load, &body.cloud, shape.as_ref(), &Arc::default(), &mut terms)?;
+                continue;
+            }
             let Some(on) = &condition.on else { continue };
             let slots = self.slots(on, &body.cloud, &format!("conditions[{k}].on"))?;
             if let Some(motion) = &condition.initial {
@@ -406,6 +415,7 @@ impl<const D: usize> Builder<'_, D> {
             folder: folder.clone(),
             threads: rayon::current_num_threads(),
             setup_seconds: 0.0,
+            loads: self.loads.take(),
         })
     }
 

@@ -4,12 +4,13 @@ mod diffusion;
 mod elasticity;
 mod images;
 mod materials;
+mod surfaces;
 
 use std::collections::BTreeSet;
 
 use super::diagnostics::Diagnostic;
 use super::model::{
-    Case, Crack, FieldName, Hybrid, LinearSolver, Load, Motion, Output, Region, Scheme, Shape, Solver,
+    Axis, Case, Crack, FieldName, Hybrid, LinearSolver, Load, Motion, Output, Region, Scheme, Shape, Solver,
     SurfaceCorrection,
 };
 use super::read::{Located, Source};
@@ -62,6 +63,7 @@ impl Checker<'_> {
             }
             self.region(region, dimension, &path);
         }
+        self.surfaces(case);
         self.discretization(case);
         self.physics(case);
         if case.physics.elasticity.is_some() {
@@ -94,8 +96,25 @@ impl Checker<'_> {
             let path = format!("conditions[{k}]");
             let acts = [condition.initial.is_some(), condition.prescribe.is_some(), condition.load.is_some()];
             let given = acts.into_iter().chain([condition.mirror.is_some(), condition.periodic.is_some()]);
+            let load = condition.load.as_ref();
             match &condition.on {
+                Some(_) if load.is_some_and(Load::is_placed) => {
+                    let message = format!("a `{}` load says itself where it acts", load.map_or("", Load::name));
+                    self.error(&format!("{path}.on"), message, "remove `on`");
+                }
+                Some(on) if case.surfaces.contains_key(on) => {
+                    used.insert(on);
+                    if !load.is_some_and(Load::is_by_area) {
+                        let message =
+                            format!("`{on}` is a surface: tractions, pressures, fluxes and moments act on it");
+                        self.error(&format!("{path}.on"), message, "name a set of points");
+                    } else if load.is_some_and(|load| load.layer() != (None, None)) {
+                        let message = "a surface has its own area: `thickness` and `area` are for sets of points";
+                        self.error(&format!("{path}.load"), message, "remove the key");
+                    }
+                }
                 Some(on) => self.set_name(on, case, imported, &format!("{path}.on"), &mut used),
+                None if load.is_some_and(Load::is_placed) => {}
                 None if acts.contains(&true) => {
                     let message = "missing key `on`: the set of points that this condition acts on";
                     self.error(&path, message, "add `on = \"<set>\"`, such as `on = \"all\"`");
@@ -132,6 +151,23 @@ impl Checker<'_> {
                 Some(Load::Traction { component, .. }) => {
                     self.component(*component, dimension, &format!("{path}.load.traction.component"));
                 }
+                Some(load @ Load::Point { at, component, .. }) => {
+                    let path = format!("{path}.load.{}", load.name());
+                    self.vector(at, dimension, &format!("{path}.at"));
+                    self.component(*component, dimension, &format!("{path}.component"));
+                }
+                Some(load @ Load::Line { from, to, component, .. }) => {
+                    let path = format!("{path}.load.{}", load.name());
+                    self.vector(from, dimension, &format!("{path}.from"));
+                    self.vector(to, dimension, &format!("{path}.to"));
+                    self.component(*component, dimension, &format!("{path}.component"));
+                }
+                Some(Load::Moment { axis, .. })
+                    if dimension == 1 || (dimension == 2 && *axis != Some(Axis::Z) && axis.is_some()) =>
+                {
+                    let message = format!("there is no moment about this axis in {dimension}D");
+                    self.error(&format!("{path}.load.moment"), message, "in 2D moments are about z");
+                }
                 Some(Load::Pressure { .. }) if case.geometry.shape.is_none() => {
                     let message = "a pressure needs the normals of `geometry.shape`, and this body comes from a file";
                     self.error(&format!("{path}.load.pressure"), message, "use a traction by component");
@@ -146,6 +182,11 @@ impl Checker<'_> {
         for name in case.sets.keys().filter(|_| self.list.is_empty()).cloned().collect::<Vec<_>>() {
             if !used.contains(name.as_str()) {
                 self.warning(&format!("sets.{name}"), "this set is defined but never used");
+            }
+        }
+        for name in case.surfaces.keys().filter(|_| self.list.is_empty()).cloned().collect::<Vec<_>>() {
+            if !used.contains(name.as_str()) {
+                self.warning(&format!("surfaces.{name}"), "this surface is defined but never used");
             }
         }
     }
@@ -439,7 +480,8 @@ impl Checker<'_> {
     ) {
         used.insert(name);
         let (_, materials) = case.physics.materials();
-        if name == "all" || case.sets.contains_key(name) || materials.contains_key(name) || imported {
+        let known = case.sets.contains_key(name) || case.surfaces.contains_key(name);
+        if name == "all" || known || materials.contains_key(name) || imported {
             return;
         }
         let names = case.sets.keys().chain(materials.keys().filter(|name| !case.sets.contains_key(*name)));

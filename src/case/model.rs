@@ -35,6 +35,9 @@ pub struct Case {
     /// Named sets of points, by which conditions, failure rules and outputs reach them.
     #[serde(default)]
     pub sets: BTreeMap<String, Region>,
+    /// Named parts of the surface of `geometry.shape`, on which tractions, pressures, fluxes and moments act.
+    #[serde(default)]
+    pub surfaces: BTreeMap<String, SurfacePart>,
     pub discretization: Discretization,
     /// Cells of several sizes, from the start or as the solution wants them.
     pub refinement: Option<Refinement>,
@@ -67,7 +70,8 @@ pub struct Header {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// Name of a set, or `all`. Needed but by `mirror` and `periodic`, which are about the whole body.
+    /// Name of a set, or `all`; of a load by area, of a surface too. Needed but by `mirror` and `periodic`, which are about the whole
+    /// body, and by loads that say where they act.
     pub on: Option<String>,
     /// Values at t = 0.
     pub initial: Option<Motion>,
@@ -134,24 +138,56 @@ pub enum Load {
         #[schemars(extend("x-unit" = "N/m^3", "x-expression" = ["x", "y", "z", "t"]))]
         value: Formula,
     },
-    /// Force per area of a face, spread over the set as a layer of the given thickness.
+    /// Force per area of a surface, or of the surface above a set of points.
     Traction {
         /// 0 for x, 1 for y, 2 for z.
         #[schemars(range(min = 0, max = 2))]
         component: usize,
         #[schemars(extend("x-unit" = "Pa", "x-expression" = ["x", "y", "z", "t"]))]
         value: Formula,
-        /// Thickness of the layer that the set is; the spacing if not given (one row of cells).
+        /// Instead of looking for the surface: the set is a layer this thick, and the force a body force in it.
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0))]
         thickness: Option<f64>,
+        /// Or: the set stands for so much of the surface, which its points share by volume. m² (2D: m; 1D: 1).
+        #[schemars(extend("x-unit" = "", "exclusiveMinimum" = 0))]
+        area: Option<f64>,
     },
-    /// Pressure on the body's surface, against its outward normal, spread over the set as a layer.
+    /// Pressure on a surface, or on the surface above a set of points, against the outward normal.
     Pressure {
         #[schemars(extend("x-unit" = "Pa", "x-expression" = ["x", "y", "z", "t"]))]
         value: Formula,
-        /// Thickness of the layer that the set is; the spacing if not given (one row of cells).
+        /// Instead of looking for the surface: the set is a layer this thick, and the force a body force in it.
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0))]
         thickness: Option<f64>,
+    },
+    /// A force at a place, N (2D: of unit thickness).
+    Point {
+        #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
+        at: Vec<f64>,
+        /// 0 for x, 1 for y, 2 for z.
+        #[schemars(range(min = 0, max = 2))]
+        component: usize,
+        #[schemars(extend("x-unit" = "N", "x-expression" = ["x", "y", "z", "t"]))]
+        value: Formula,
+    },
+    /// A force per length along a straight line.
+    Line {
+        #[schemars(extend("x-unit" = "m"), length(min = 2, max = 3))]
+        from: Vec<f64>,
+        #[schemars(extend("x-unit" = "m"), length(min = 2, max = 3))]
+        to: Vec<f64>,
+        /// 0 for x, 1 for y, 2 for z.
+        #[schemars(range(min = 0, max = 2))]
+        component: usize,
+        #[schemars(extend("x-unit" = "N/m", "x-expression" = ["x", "y", "z", "t"]))]
+        value: Formula,
+    },
+    /// A moment on a surface, or on the surface above a set: tractions that grow with the distance from its centroid and have no sum.
+    Moment {
+        /// About which; in 2D there is z alone.
+        axis: Option<Axis>,
+        #[schemars(extend("x-unit" = "N*m", "x-expression" = ["x", "y", "z", "t"]))]
+        value: Formula,
     },
     /// Of diffusion: what is set free, per volume and second.
     Source {
@@ -159,14 +195,17 @@ pub enum Load {
         #[schemars(extend("x-unit" = "1/s", "x-expression" = ["x", "y", "z", "t"]))]
         value: Formula,
     },
-    /// Of diffusion: what enters through a face, per area and second, spread over the set as a layer.
+    /// Of diffusion: what enters through a surface, or the surface above a set of points, per area and second.
     Flux {
         /// Inward, unit of C times m/s.
         #[schemars(extend("x-unit" = "m/s", "x-expression" = ["x", "y", "z", "t"]))]
         value: Formula,
-        /// Thickness of the layer that the set is; the spacing if not given (one row of cells).
+        /// Instead of looking for the surface: the set is a layer this thick, and the flux a source in it.
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0))]
         thickness: Option<f64>,
+        /// Or: the set stands for so much of the surface, which its points share by volume. m² (2D: m; 1D: 1).
+        #[schemars(extend("x-unit" = "", "exclusiveMinimum" = 0))]
+        area: Option<f64>,
     },
 }
 
@@ -179,7 +218,29 @@ impl Load {
             Load::Pressure { .. } => "pressure",
             Load::Source { .. } => "source",
             Load::Flux { .. } => "flux",
+            Load::Point { .. } => "point",
+            Load::Line { .. } => "line",
+            Load::Moment { .. } => "moment",
         }
+    }
+
+    /// `thickness` and `area`.
+    pub fn layer(&self) -> (Option<f64>, Option<f64>) {
+        match self {
+            Load::Traction { thickness, area, .. } | Load::Flux { thickness, area, .. } => (*thickness, *area),
+            Load::Pressure { thickness, .. } => (*thickness, None),
+            _ => (None, None),
+        }
+    }
+
+    /// Whether it acts by area, so that it can be on a surface.
+    pub fn is_by_area(&self) -> bool {
+        matches!(self, Load::Traction { .. } | Load::Pressure { .. } | Load::Flux { .. } | Load::Moment { .. })
+    }
+
+    /// Whether it says itself where it acts.
+    pub fn is_placed(&self) -> bool {
+        matches!(self, Load::Point { .. } | Load::Line { .. })
     }
 }
 

@@ -1,8 +1,8 @@
-//! Body forces, and tractions and pressures spread over a layer.
+//! Body forces, and tractions and pressures, which are spread over the points beside a surface or over a layer.
 
 use std::sync::Arc;
 
-use super::{Booked, FormulaAtPoints, Scale, Term, Volumes};
+use super::{Booked, FormulaAtPoints, Scale, Spread, Term, Volumes};
 use crate::field::Number;
 use crate::refinement::Remap;
 use crate::unknown::{Component, Unknown, with};
@@ -10,15 +10,17 @@ use crate::visit::Visitor;
 
 /// A force density on one component at the points of a set, b(x, t) in N/m³.
 ///
-/// A traction t on a face becomes the body force t/ℓ in a layer of thickness ℓ (Shojaei et al. 2022, section 2.1); a
-/// pressure acts against the outward normal of the shape.
+/// What acts on a surface is [spread](Spread) over the points beside it. In a layer of thickness ℓ a traction t is the body force
+/// t/ℓ (Shojaei et al. 2022, section 2.1).
 #[derive(Debug, Clone)]
 pub struct Load {
     pub slots: Arc<[u32]>,
     pub component: usize,
     pub profile: FormulaAtPoints,
-    /// Multiplies the profile: 1 for body forces, 1/ℓ for tractions, −n/ℓ by point for pressures.
+    /// Multiplies the profile: 1 for body forces, 1/ℓ in layers.
     pub scale: Scale,
+    /// Instead of that: the profile is at pieces of a surface, and says forces.
+    pub spread: Option<Spread>,
     /// Acts while t ≤ until, s.
     pub until: f64,
     /// Of the points of the set.
@@ -34,19 +36,25 @@ impl Load {
     pub fn new(slots: Arc<[u32]>, component: usize, profile: FormulaAtPoints) -> Self {
         let (scale, volume) = (Scale::Same(1.0), Scale::Same(1.0));
         let (force, displacement) = (Vec::new(), Vec::new());
-        Load { slots, component, profile, scale, until: f64::INFINITY, volume, force, displacement }
+        Load { slots, component, profile, scale, spread: None, until: f64::INFINITY, volume, force, displacement }
+    }
+
+    /// On a surface; the profile is at its pieces.
+    pub fn spread(slots: Vec<u32>, component: usize, profile: FormulaAtPoints, spread: Spread) -> Self {
+        Load { spread: Some(spread), ..Load::new(slots.into(), component, profile) }
     }
 
     fn apply<T: Number>(&mut self, t: f64, dt: f64, displacement: &[T], force: &mut [T]) -> Booked {
         let active = t <= self.until;
         let values = self.profile.at(t);
+        let density = density(&self.scale, self.spread.as_ref(), &self.volume);
         let mut booked = Booked { component: self.component, ..Booked::default() };
         let first = self.force.is_empty();
         self.force.resize(self.slots.len(), 0.0);
         self.displacement.resize(self.slots.len(), 0.0);
         for (k, &slot) in self.slots.iter().enumerate() {
             let slot = slot as usize;
-            let b = if active { self.scale.of(k) * values[k] } else { 0.0 };
+            let b = if active { density(k, values) } else { 0.0 };
             let u = displacement[slot].to_f64();
             if !first {
                 let mean = 0.5 * (self.force[k] + b) * self.volume.of(k);
@@ -73,6 +81,15 @@ impl Load {
     }
 }
 
+/// The force density on point `k` of a load, from the values of its profile.
+#[inline]
+fn density<'a>(scale: &'a Scale, spread: Option<&'a Spread>, volume: &'a Scale) -> impl Fn(usize, &[f64]) -> f64 + 'a {
+    move |k, values| match spread {
+        None => scale.of(k) * values[k],
+        Some(spread) => spread.force(k, values) / volume.of(k),
+    }
+}
+
 impl Term for Load {
     fn add(&mut self, t: f64, dt: f64, to: &mut Unknown<'_>) -> Booked {
         with!(to, vectors => {
@@ -95,8 +112,10 @@ impl Term for Load {
             return;
         }
         let component = &mut load[self.component * n..][..n];
-        for (k, (&slot, value)) in self.slots.iter().zip(self.profile.at(t)).enumerate() {
-            component[slot as usize] += self.scale.of(k) * value;
+        let values = self.profile.at(t);
+        let density = density(&self.scale, self.spread.as_ref(), &self.volume);
+        for (k, &slot) in self.slots.iter().enumerate() {
+            component[slot as usize] += density(k, values);
         }
     }
 
@@ -105,6 +124,12 @@ impl Term for Load {
     }
 
     fn remap(&mut self, remap: &Remap) {
+        if let Some(spread) = &self.spread {
+            let (slots, spread) = spread.again(&remap.positions, &remap.volumes);
+            (self.slots, self.spread) = (slots.into(), Some(spread));
+            self.restart();
+            return;
+        }
         let slots = remap.members(&self.slots);
         if let Scale::ByPoint(factors) = &mut self.scale {
             let cell = |k: &u32| remap.origins[*k as usize].cell();

@@ -9,11 +9,13 @@ pub mod mirror;
 pub mod prescribed;
 pub mod profile;
 pub mod random;
+pub mod spread;
 
 pub use load::Load;
 pub use mirror::MirrorForce;
 pub use prescribed::{Prescribed, Quantity};
 pub use profile::FormulaAtPoints;
+pub use spread::{Loaded, Spread};
 
 use crate::refinement::Remap;
 use crate::unknown::Unknown;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::expression::Expression;
-use crate::field::embed;
+use crate::field::{Vector, embed};
 use crate::geometry::Cloud;
 
 /// The names that a formula may use, in the order in which they are given: reference position (m) and time (s).
@@ -30,9 +30,24 @@ impl FormulaAtPoints {
         FormulaAtPoints::with(expression, columns, slots)
     }
 
+    /// At places that are no points, m.
+    pub fn at_places<const D: usize>(expression: Expression, places: impl Iterator<Item = Vector<D>> + Clone) -> Self {
+        let columns = std::array::from_fn(|axis| places.clone().map(|x| embed(&x)[axis]).collect());
+        FormulaAtPoints::of(expression, columns, places.count())
+    }
+
     fn with(expression: Expression, columns: [Vec<f64>; 3], slots: &Arc<[u32]>) -> Self {
+        FormulaAtPoints::of(expression, columns, slots.len())
+    }
+
+    fn of(expression: Expression, columns: [Vec<f64>; 3], count: usize) -> Self {
         let moves = expression.uses("t");
-        FormulaAtPoints { expression, columns, values: vec![0.0; slots.len()], moves, ready: false }
+        FormulaAtPoints { expression, columns, values: vec![0.0; count], moves, ready: false }
+    }
+
+    /// Whether it has the same value everywhere.
+    pub fn is_uniform(&self) -> bool {
+        !VARIABLES[..3].iter().any(|axis| self.expression.uses(axis))
     }
 
     /// The same formula at the points of another set. `positions` by slot, m.

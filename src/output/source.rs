@@ -97,6 +97,25 @@ pub struct BodySummary {
     pub memory: u64,
 }
 
+/// What a load adds up to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoadSummary {
+    /// Which of the conditions, from zero.
+    pub condition: usize,
+    /// What it is: `traction`.
+    pub kind: &'static str,
+    /// A set or a surface.
+    pub on: String,
+    /// Of the surface that it acts on, m² (2D: m); None where that is not known.
+    pub area: Option<f64>,
+    /// s: the start, or the end where it is nothing at the start.
+    pub time: f64,
+    /// N (2D: N/m); of what diffuses the first is the amount that enters in a second.
+    pub force: [f64; 3],
+    /// About the origin, N m.
+    pub moment: [f64; 3],
+}
+
 /// What is known of its physics.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PhysicsSummary {

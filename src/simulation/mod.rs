@@ -15,7 +15,7 @@ use crate::output::report::{
     Diffusion, Energy, Hybrid, Probed, Refinement, Report, StretchRatio, Tip, WallSeconds, peak_memory,
 };
 use crate::output::snapshot::FieldCache;
-use crate::output::source::{Points, Source};
+use crate::output::source::{LoadSummary, Points, Source};
 use crate::output::writer::{Output, ScheduledRequest};
 use crate::output::writer_thread::{Batch, WriterThread};
 use crate::solver::statics::LoadStep;
@@ -80,6 +80,8 @@ pub struct Simulation {
     /// Threads of the pool that the run takes place in.
     pub threads: usize,
     pub setup_seconds: f64,
+    /// What each load adds up to.
+    pub loads: Vec<LoadSummary>,
 }
 
 /// Where a run stands: what a progress line shows.
@@ -514,6 +516,7 @@ mod tests {
             folder,
             threads: 1,
             setup_seconds: 0.0,
+            loads: Vec::new(),
         };
         (simulation, seen)
     }

@@ -9,7 +9,7 @@ use crate::conditions::{Constraint, FormulaAtPoints, Load, Prescribed, Quantity,
 use crate::error::{Error, Result};
 use crate::expression::{Expression, nearest};
 use crate::field::Vector;
-use crate::geometry::{Cloud, Shape};
+use crate::geometry::{Cloud, Piece, Shape};
 use crate::physics::failure::CriticalStretch;
 use crate::physics::failure::critical_stretch::PairRule;
 
@@ -78,7 +78,7 @@ impl<const D: usize> Builder<'_, D> {
         Ok(Box::new(prescribed))
     }
 
-    /// The load of `conditions[k]`.
+    /// The load of `conditions[k]`; `slots` are those of the set that it is on, or of the points that carry its surface.
     pub(super) fn load(
         &self,
         k: usize,
@@ -88,36 +88,93 @@ impl<const D: usize> Builder<'_, D> {
         slots: &Arc<[u32]>,
         terms: &mut Vec<Box<dyn Term>>,
     ) -> Result<()> {
-        let until = self.case.value.conditions[k].until.unwrap_or(f64::INFINITY);
-        let path = format!("conditions[{k}].load.{}.value", load.name());
-        let mut push = |component, value: &Formula, scale| -> Result<()> {
-            let profile = self.profile(value, cloud, slots, &path)?;
-            let mut load = Load::new(slots.clone(), component, profile);
-            (load.scale, load.until) = (scale, until);
-            terms.push(Box::new(load));
-            Ok(())
-        };
+        let (before, mut area) = (terms.len(), None);
         match load {
-            model::Load::BodyForce { component, value } => push(*component, value, Scale::Same(1.0)),
-            model::Load::Source { value } => push(0, value, Scale::Same(1.0)),
-            model::Load::Flux { value, thickness } => {
-                push(0, value, Scale::Same(1.0 / thickness.unwrap_or(cloud.spacing)))
+            model::Load::BodyForce { component, value } => {
+                self.in_volume(k, *component, value, Scale::Same(1.0), cloud, slots, terms)?;
             }
-            model::Load::Traction { component, value, thickness } => {
-                push(*component, value, Scale::Same(1.0 / thickness.unwrap_or(cloud.spacing)))
+            model::Load::Source { value } => self.in_volume(k, 0, value, Scale::Same(1.0), cloud, slots, terms)?,
+            model::Load::Point { .. } | model::Load::Line { .. } | model::Load::Moment { .. } => {
+                self.apart_from_area(k, load, cloud, shape, slots, terms)?;
             }
-            model::Load::Pressure { value, thickness } => {
-                let thickness = thickness.unwrap_or(cloud.spacing);
-                let Some(shape) = shape else { return Ok(()) };
-                let normals: Vec<Vector<D>> =
-                    slots.iter().map(|&slot| shape.normal(&cloud.position(slot as usize))).collect();
-                for d in 0..D {
-                    let scale = Scale::ByPoint(normals.iter().map(|n| -n[d] / thickness).collect());
-                    push(d, value, scale)?;
+            model::Load::Traction { component, value, .. } => {
+                area = self.by_area(k, *component, value, cloud, shape, slots, terms)?;
+            }
+            model::Load::Flux { value, .. } => area = self.by_area(k, 0, value, cloud, shape, slots, terms)?,
+            model::Load::Pressure { value, thickness } => match self.pieces_of(k, cloud, shape, slots)? {
+                Some(pieces) => {
+                    area = Some(pieces.iter().map(|piece| piece.area).sum());
+                    let inward = |piece: &Piece<D>| piece.normal.map(|n| -n * piece.area);
+                    self.on_pieces(k, value, cloud, shape, &pieces, &inward, terms)?;
                 }
-                Ok(())
-            }
+                None => {
+                    let thickness = thickness.unwrap_or(cloud.spacing);
+                    let Some(shape) = shape else { return Ok(()) };
+                    let normals: Vec<Vector<D>> =
+                        slots.iter().map(|&slot| shape.normal(&cloud.position(slot as usize))).collect();
+                    for d in 0..D {
+                        let scale = Scale::ByPoint(normals.iter().map(|n| -n[d] / thickness).collect());
+                        self.in_volume(k, d, value, scale, cloud, slots, terms)?;
+                    }
+                }
+            },
         }
+        self.summarise(k, cloud, area, &mut terms[before..]);
+        Ok(())
+    }
+
+    /// A density at the points of a set.
+    #[allow(clippy::too_many_arguments)] // what, where, onto what
+    fn in_volume(
+        &self,
+        k: usize,
+        component: usize,
+        value: &Formula,
+        scale: Scale,
+        cloud: &Cloud<D>,
+        slots: &Arc<[u32]>,
+        terms: &mut Vec<Box<dyn Term>>,
+    ) -> Result<()> {
+        let condition = &self.case.value.conditions[k];
+        let name = condition.load.as_ref().map_or("", model::Load::name);
+        let profile = self.profile(value, cloud, slots, &format!("conditions[{k}].load.{name}.value"))?;
+        let mut load = Load::new(slots.clone(), component, profile);
+        (load.scale, load.until) = (scale, condition.until.unwrap_or(f64::INFINITY));
+        terms.push(Box::new(load));
+        Ok(())
+    }
+
+    /// What acts by area along a component, or enters by area; gives the area if it is known.
+    #[allow(clippy::too_many_arguments)] // what, where, onto what
+    fn by_area(
+        &self,
+        k: usize,
+        component: usize,
+        value: &Formula,
+        cloud: &Cloud<D>,
+        shape: Option<&Shape<D>>,
+        slots: &Arc<[u32]>,
+        terms: &mut Vec<Box<dyn Term>>,
+    ) -> Result<Option<f64>> {
+        if let Some(pieces) = self.pieces_of(k, cloud, shape, slots)? {
+            let along = |piece: &Piece<D>| std::array::from_fn(|d| if d == component { piece.area } else { 0.0 });
+            self.on_pieces(k, value, cloud, shape, &pieces, &along, terms)?;
+            return Ok(Some(pieces.iter().map(|piece| piece.area).sum()));
+        }
+        let (thickness, area) = self.case.value.conditions[k].load.as_ref().map_or((None, None), model::Load::layer);
+        let scale = match (thickness, area) {
+            (Some(thickness), _) => Scale::Same(1.0 / thickness),
+            (None, Some(area)) => {
+                Scale::Same(area / slots.iter().map(|&slot| cloud.volume(slot as usize)).sum::<f64>())
+            }
+            // One row of cells, each as thick as it is itself.
+            (None, None) => {
+                let side = |slot: &u32| cloud.volume(*slot as usize).powf(1.0 / D as f64);
+                Scale::ByPoint(slots.iter().map(|slot| 1.0 / side(slot)).collect())
+            }
+        };
+        self.in_volume(k, component, value, scale, cloud, slots, terms)?;
+        Ok(area)
     }
 
     /// `critical`: the critical stretch of a fracture energy, J/m².

@@ -283,7 +283,7 @@ impl<const D: usize> Builder<'_, D> {
             cloud.sets.insert(name, slots);
         }
         cloud.sets.insert("all", all);
-        Ok(())
+        self.surfaces(cloud, shape)
     }
 
     /// Whether a place is in a region, but for a tie, m.

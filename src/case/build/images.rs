@@ -32,6 +32,16 @@ impl<const D: usize> Builder<'_, D> {
         if self.periodic(d).is_some() { 2 } else { self.mirrors(d).count() }
     }
 
+    /// Whether there are images beyond the lower and the upper end of an axis.
+    pub(super) fn continued(&self, d: usize) -> [bool; 2] {
+        let conditions = self.case.value.conditions.iter();
+        let mirrored = |side| {
+            let mut mirrors = conditions.clone().filter_map(|condition| condition.mirror.as_ref());
+            self.periodic(d).is_some() || mirrors.any(|mirror| mirror.axis as usize == d && mirror.side == side)
+        };
+        [model::Side::Low, model::Side::High].map(mirrored)
+    }
+
     /// The cloud with the images of its points.
     pub(super) fn with_images(
         &self,

@@ -64,7 +64,7 @@ fn mirrored(of: &[bool], [n, m]: [i64; 2]) -> Vec<bool> {
 fn ten_thousand_sets_and_their_mirror_images() {
     let case = smallest();
     let options = Options::default();
-    let builder = Builder::<2> { case: &case, options: &options };
+    let builder = Builder::<2> { case: &case, options: &options, loads: Default::default() };
     let mut random = Random(ChaCha8Rng::seed_from_u64(7));
     for round in 0..10_000 {
         let unit = [1.0, 1e-3, 1e-9, 1e4, 0.3048, 1.0 / 3.0][random.below(6) as usize];

@@ -87,8 +87,8 @@ impl Checker<'_> {
                     self.error(&format!("conditions[{k}].{key}.{}", motion.name()), message, &help);
                 }
             }
-            if let Some(load @ (Load::BodyForce { .. } | Load::Traction { .. } | Load::Pressure { .. })) =
-                &condition.load
+            if let Some(load) =
+                condition.load.as_ref().filter(|load| !matches!(load, Load::Source { .. } | Load::Flux { .. }))
             {
                 let message = format!("a `{}` is for elasticity: what diffuses is not moved by forces", load.name());
                 let help = "use `source` (per volume and second) or `flux` (per area and second)";

@@ -193,6 +193,29 @@ pub enum Region {
     Not(std::boxed::Box<Region>),
 }
 
+/// Which part of the surface of the body is meant.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum SurfacePart {
+    /// Where a formula of place and outward normal is true (not zero), such as `"ny > 0.5 and x > 0"`.
+    Where(#[schemars(extend("x-expression" = ["x", "y", "z", "nx", "ny", "nz"]))] Formula),
+    /// What of it lies between two corners, those included.
+    Box {
+        #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
+        low: Vec<f64>,
+        #[schemars(extend("x-unit" = "m"), length(min = 1, max = 3))]
+        high: Vec<f64>,
+    },
+    /// What of it lies in a shape, or on its border.
+    Inside(Shape),
+    /// What is in all of these.
+    All(#[schemars(length(min = 1))] Vec<SurfacePart>),
+    /// What is in any of these.
+    Any(#[schemars(length(min = 1))] Vec<SurfacePart>),
+    /// The rest of the surface.
+    Not(std::boxed::Box<SurfacePart>),
+}
+
 /// A pre-crack.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
