@@ -24,6 +24,7 @@ mod joint;
 mod kirsch;
 mod navier;
 mod precision;
+mod pressed;
 mod refined_branching;
 mod surface_effect;
 mod two_layers;
@@ -94,6 +95,7 @@ pub const STUDIES: &[Study] = &[
     precision::PRECISION,
     double_cantilever::STUDY,
     kirsch::STUDY,
+    pressed::STUDY,
     joint::STUDY,
     inclusion::STUDY,
     delamination::STUDY,

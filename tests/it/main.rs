@@ -21,3 +21,4 @@ mod state;
 mod state_based;
 mod statics;
 mod stress;
+mod surfaces;
