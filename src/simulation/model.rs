@@ -135,6 +135,11 @@ impl Stepper for Model {
     fn conclude(&mut self, solver: &Solver, clock: &Clock) -> Result<()> {
         self.problem.conclude(solver, clock)
     }
+    fn prove_step(&mut self) -> Option<f64> {
+        let proven = self.problem.prove_step();
+        self.facts.stable_step = self.facts.stable_step.max(proven.unwrap_or(0.0));
+        proven
+    }
     fn visit(&mut self, visitor: &mut dyn Visitor) {
         self.problem.visit(visitor);
     }
