@@ -7,6 +7,7 @@ mod hybrid;
 mod images;
 mod materials;
 mod outputs;
+mod remarks;
 mod steps;
 
 use std::path::{Path, PathBuf};
@@ -255,9 +256,10 @@ impl<const D: usize> Builder<'_, D> {
         if let Some(composition) = &composition {
             elasticity.materials.clone_from(&composition.material);
         }
-        for crack in &cracks {
-            elasticity.cut(crack, tolerance);
-        }
+        let cut: Vec<u64> = cracks.iter().map(|crack| elasticity.cut(crack, tolerance)).collect();
+        self.remark_size(&elasticity.body);
+        self.remark_cracks(&elasticity.body, &cracks, &cut, tolerance);
+        self.remark_parts(&elasticity.body, &elasticity.state.states);
         let (mut constraints, mut terms) = (Vec::new(), self.mirror_forces(&elasticity.body.cloud));
         for (k, condition) in case.conditions.iter().enumerate() {
             let Elasticity { body, state, .. } = &mut elasticity;
@@ -288,6 +290,7 @@ impl<const D: usize> Builder<'_, D> {
         let (bar_speed, slowest) = (speeds().fold(0.0, f64::max), speeds().fold(f64::INFINITY, f64::min));
         if let Some(settings) = settings {
             elasticity = self.hybridise(settings, elasticity, solid, &scaling, horizon / slowest)?;
+            self.remark_hybrid(elasticity.hybrid().map_or(0.0, |work| work.standard[1]));
         }
         let stable_step = elasticity.stable_step().min(finest_step);
         let smallest = elasticity.failure.as_ref().map(CriticalStretch::smallest).filter(|s| s.is_finite());
@@ -338,6 +341,7 @@ impl<const D: usize> Builder<'_, D> {
         let estimate = model.facts().stable_step;
         let mut stages = self.stages(StableStep { estimate, prove: &mut || model.prove_step() })?;
         let facts = model.facts().clone();
+        self.remark_steps(&mut *model, &stages.iter().collect::<Vec<_>>());
         let first = stages.pop_front().expect("a case has a solver");
         let last = stages.back().unwrap_or(&first);
         let n_steps = last.first + last.n_steps;

@@ -4,6 +4,7 @@ mod diffusion;
 mod elasticity;
 mod images;
 mod materials;
+mod plausible;
 
 use std::collections::BTreeSet;
 
@@ -139,6 +140,7 @@ impl Checker<'_> {
                 _ => {}
             }
         }
+        self.plausible(case);
         self.images(case);
         self.solvers(case);
         self.outputs(case, imported, &mut used);

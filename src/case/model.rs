@@ -60,6 +60,20 @@ pub struct Header {
     /// Dimension of space.
     #[schemars(range(min = 1, max = 3))]
     pub dimension: usize,
+    /// Whether numbers are in SI units, or in none: then nobody wonders at their size.
+    #[serde(default)]
+    pub units: Units,
+}
+
+/// What numbers of a case are in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Units {
+    /// SI units.
+    #[default]
+    Si,
+    /// None: they are ratios to quantities that the user knows, or of a consistent system of other units.
+    None,
 }
 
 /// Something that acts on the points of a set, exactly one of `initial`, `prescribe`, `load`; or what is beyond an end of the

@@ -32,6 +32,24 @@ impl Problem {
     }
 }
 
+impl Problem {
+    /// How long it takes to sum a rate, s: the second of two, when memory is there.
+    pub fn seconds_per_rate(&mut self) -> Option<f64> {
+        let n = self.physics.points().n_slots() * self.physics.unknown().components;
+        let [u, mut force] = [vec![0.0; n], vec![0.0; n]];
+        let mut once = || {
+            let begin = std::time::Instant::now();
+            match self.physics.tangent() {
+                Some(body) => body.forces(&u, &mut force),
+                None => diffuse(&mut *self.physics, &u, &mut force),
+            }
+            begin.elapsed().as_secs_f64()
+        };
+        once();
+        Some(once())
+    }
+}
+
 /// M^(−½) K M^(−½)
 struct Scaled<'a> {
     physics: &'a mut dyn Physics,

@@ -44,6 +44,10 @@ pub trait Stepper: Source + Send {
     fn prove_step(&mut self) -> Option<f64> {
         None
     }
+    /// How long it takes to sum a rate, s, by trying it before the start; None where nobody can tell.
+    fn seconds_per_rate(&mut self) -> Option<f64> {
+        None
+    }
     /// Shows everything that changes in a run but the clock.
     fn visit(&mut self, visitor: &mut dyn Visitor);
     /// What the load steps of static solvers took.
