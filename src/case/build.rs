@@ -341,7 +341,6 @@ impl<const D: usize> Builder<'_, D> {
         let estimate = model.facts().stable_step;
         let mut stages = self.stages(StableStep { estimate, prove: &mut || model.prove_step() })?;
         let facts = model.facts().clone();
-        self.remark_steps(&mut *model, &stages.iter().collect::<Vec<_>>());
         let first = stages.pop_front().expect("a case has a solver");
         let last = stages.back().unwrap_or(&first);
         let n_steps = last.first + last.n_steps;
@@ -393,6 +392,8 @@ impl<const D: usize> Builder<'_, D> {
                 }
             }
         }
+        // Last, since it takes a while: nothing is wrong with the case.
+        self.remark_steps(&mut *model, &std::iter::once(&first).chain(&stages).collect::<Vec<_>>());
         let mut clock = Clock::new(first.dt);
         clock.run_to(first.n_steps, first.ends);
         Ok(Simulation {

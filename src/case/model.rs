@@ -85,14 +85,14 @@ pub struct Condition {
     pub on: Option<String>,
     /// Values at t = 0.
     pub initial: Option<Motion>,
-    /// Values imposed while t ≤ until.
+    /// Values imposed up to `until`.
     pub prescribe: Option<Motion>,
     pub load: Option<Load>,
     /// The body goes on as its own image beyond a plane.
     pub mirror: Option<Mirror>,
     /// The body goes on beyond its end as it begins.
     pub periodic: Option<Periodic>,
-    /// When a prescribed value is released or a load ends.
+    /// When a prescribed value is released or a load ends: a step ends there.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
     pub until: Option<f64>,
 }

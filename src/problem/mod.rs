@@ -316,6 +316,18 @@ impl Problem {
         hasher.finalize().to_hex().to_string()
     }
 
+    /// Names of two constraints on the same component of a slot, if there are any.
+    pub fn contested(&self) -> Option<[&str; 2]> {
+        self.constraints.iter().enumerate().find_map(|(k, one)| {
+            let (component, slots) = one.on();
+            let shares = |other: &&Box<dyn Constraint>| {
+                let (same, others) = other.on();
+                same == component && slots.iter().any(|slot| others.binary_search(slot).is_ok())
+            };
+            self.constraints[k + 1..].iter().find(shares).map(|other| [one.name(), other.name()])
+        })
+    }
+
     /// Broken pairs, pre-cracks not counted.
     pub fn broken_pairs(&self) -> u64 {
         self.physics.broken().bonds / 2

@@ -1,5 +1,6 @@
 //! The event loop: step, look, write, until the end. The first file to read.
 
+mod imbalance;
 mod model;
 
 use std::collections::VecDeque;
@@ -42,6 +43,10 @@ pub trait Stepper: Source + Send {
     /// The largest step that is proven stable, s, of velocity Verlet or forward Euler; it is then that of the facts too. None
     /// where none is.
     fn prove_step(&mut self) -> Option<f64> {
+        None
+    }
+    /// Names of two prescribed sets that share a point and a component, if there are any.
+    fn contested(&self) -> Option<[String; 2]> {
         None
     }
     /// How long it takes to sum a rate, s, by trying it before the start; None where nobody can tell.

@@ -140,6 +140,9 @@ impl Stepper for Model {
         self.facts.stable_step = self.facts.stable_step.max(proven.unwrap_or(0.0));
         proven
     }
+    fn contested(&self) -> Option<[String; 2]> {
+        self.problem.contested().map(|pair| pair.map(String::from))
+    }
     fn seconds_per_rate(&mut self) -> Option<f64> {
         self.problem.seconds_per_rate()
     }
