@@ -22,9 +22,9 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
             PhysicsSummary::Elastic(facts) => elastic(facts),
             PhysicsSummary::Diffusive(facts) => diffusive(facts),
         }
-        say!("stable step       {:.6e} s", facts.stable_step * simulation.solver.stability());
+        say!("stable step       {:.6e} s", simulation.solver.largest_step(facts.stable_step));
         let steps = simulation.stages_to_come.front().map_or(simulation.n_steps, |leg| leg.first);
-        let end = steps as f64 * simulation.clock.dt;
+        let end = simulation.clock.end();
         say!("steps             {steps} of {:.6e} s, to t = {end:.6e} s", simulation.clock.dt);
         for leg in &simulation.stages_to_come {
             say!("then              {} of {:.6e} s, to t = {:.6e} s", leg.n_steps, leg.dt, leg.ends);

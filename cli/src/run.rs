@@ -20,7 +20,7 @@ const IMBALANCE: f64 = 0.01;
 
 pub fn run(args: &RunArgs) -> Result<ExitCode> {
     let folder = args.out.clone().unwrap_or_else(|| free_folder(&args.case.case));
-    let report = on_threads(args.case.threads, || -> Result<Report> {
+    let (report, causes) = on_threads(args.case.threads, || -> Result<(Report, Vec<String>)> {
         let options = Options { folder: folder.clone(), many_files: args.many_files, ..Options::default() };
         let mut simulation = load(&args.case.case, &args.case.overrides, &options)?;
         prepare_folder(&folder, args.overwrite)?;
@@ -62,17 +62,19 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
             if stop.load(Ordering::Relaxed) { Control::Stop } else { Control::Continue }
         });
         line.finish();
-        report
+        let report = report?;
+        let causes = simulation.causes_of_imbalance(&report);
+        Ok((report, causes))
     })??;
     if !args.quiet {
         summary(&report, &folder);
     }
     if let Some(imbalance) = report.energy_imbalance.filter(|imbalance| *imbalance > IMBALANCE) {
         eprintln!(
-            "warning: the energy balance is off by {:.1} % of what came in\n    help: a smaller step, or loads and \
-             initial values that start more gently; see the column `imbalance` of history.csv",
+            "warning: the energy balance is off by {:.1} % of what came in; see the column `imbalance` of history.csv",
             100.0 * imbalance
         );
+        causes.iter().for_each(|cause| eprintln!("    possible cause: {cause}"));
     }
     Ok(if report.status == "interrupted" { ExitCode::from(130) } else { ExitCode::SUCCESS })
 }

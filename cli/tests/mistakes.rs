@@ -382,6 +382,15 @@ fn mistakes() -> Vec<Mistake> {
         patch("horizon_and_ratio", "horizon = \"3*h\"", "horizon = \"3*h\"\nhorizon_ratio = 3"),
         patch("neither_horizon_nor_ratio", "horizon = \"3*h\"\n", ""),
         patch("time_step_above_stable", SAFETY, "time_step = \"1 us\""),
+        patch("constant_named_like_a_unit", "h = \"1 mm\"", "h = \"1 mm\"\nL = \"20 h\""),
+        patch("time_in_a_constant", "end_time = \"5 us\"", "end_time = \"2 h\""),
+        Mistake::patch(
+            "damping_beyond_the_step",
+            &[
+                ("[solver.velocity_verlet]", "[solver.runge_kutta]"),
+                (SAFETY, "time_step = \"10 ns\"\ndamping = \"1 1/ns\""),
+            ],
+        ),
         patch("safety_and_time_step", SAFETY, "safety = 0.8\ntime_step = \"10 ns\""),
         patch("end_time_of_ages", "end_time = \"5 us\"", "end_time = 1e12"),
         patch(

@@ -562,3 +562,62 @@ fn a_benchmark_of_no_problem_is_a_matter_of_usage() {
     assert_eq!(place.call(&["bench", "block3d", "--precision", "half"]).0, 2);
     assert_eq!(place.call(&["bench", "block3d", "--size", "2"]).0, 2);
 }
+
+/// What is odd is said and done all the same; what is not, is not.
+#[test]
+fn odd_things_are_said_and_the_case_is_taken() {
+    let place = Place::new("odd");
+    let law = "physics.elasticity.law.bond_based";
+    let young = |value: &str| format!("{law}.young={value}");
+    let density = |value: &str| format!("{law}.density={value}");
+    let cracks = |list: &str| format!("geometry.cracks=[{list}]");
+    let large = || vec!["geometry.shape.rectangle.size=[4e4, 2e4]".to_string(), "geometry.spacing=1e3".into()];
+    let none = "case.units=none".to_string();
+    let with = |mut list: Vec<String>, more: &str| {
+        list.push(more.into());
+        list
+    };
+    let table: Vec<(Vec<String>, &[&str])> = vec![
+        (vec![], &[]),
+        (
+            vec![young("72")],
+            &["bond_based.young: found 72", "50 to 20,000", "did you mean `young = \"72 GPa\"`?", "units = \"none\""],
+        ),
+        (vec![density("2.44")], &["waves of 1.7", "did you mean `density = \"2.44 g/cm^3\"`?"]),
+        (
+            vec![young("72e3"), density("2.44e-9")],
+            &["`young = \"72000 MPa\"` and `density = \"0.00000000244 Mg/mm^3\"`"],
+        ),
+        (vec![young("500"), density("0.1")], &["softer than any solid"]),
+        (vec![young("1"), density("1"), none.clone()], &[]),
+        (large(), &["the body is 4.0000e4 m long", "in mm it would be 40.0000 m", "cuts no bond"]),
+        (with(with(large(), "geometry.cracks=[]"), &none), &[]),
+        (
+            vec![cracks("{ segment = { from = [-20, 0], to = [-5, 0] } }")],
+            &["cracks[0]: ", "this pre-crack cuts no bond"],
+        ),
+        (
+            vec![cracks("{ segment = { from = [-0.02, 5e-4], to = [-0.005, 5e-4] } }")],
+            &["15 points lie on this pre-crack, the first at (-0.0195, 0.0005) m", "half a spacing"],
+        ),
+        (
+            vec![cracks("{ segment = { from = [-0.03, 0], to = [0.03, 0] } }")],
+            &["in 2 parts without a bond between them: 400 points, 400 points", "pass through each other"],
+        ),
+        (vec!["discretization.scheme={ hybrid = {} }".into()], &["of the points sum their bonds from the start"]),
+        (
+            vec!["solver.velocity_verlet.end_time=1 s".into(), "output=[]".into()],
+            &["e6 steps of", "on this machine", "quasi_static"],
+        ),
+    ];
+    for (sets, expected) in table {
+        let mut args = vec!["check", "case.toml"];
+        sets.iter().for_each(|set| args.extend(["--set", set]));
+        let (code, _, error) = place.call(&args);
+        assert_eq!(code, 0, "{sets:?}: {error}");
+        assert!(!expected.is_empty() || !error.contains("warning"), "{sets:?}: {error}");
+        for part in expected {
+            assert!(error.contains(part), "{sets:?}: {part}\n{error}");
+        }
+    }
+}

@@ -9,6 +9,7 @@
 //! | general | [`bicgstab()`], [`gmres()`] (safer, more memory), [`Direct::lu`] |
 //! | with rigid motions | any of the first with [`Projected`], or [`Bordered`] |
 //! | small and dense, rank to be known | [`SingularValues`] |
+//! | symmetric, its largest eigenvalue to be known | [`bound_of_largest_eigenvalue()`] |
 
 mod bicgstab;
 mod conjugate_gradients;
@@ -16,6 +17,7 @@ mod direct;
 mod gmres;
 mod incomplete;
 mod krylov;
+mod lanczos;
 mod null_space;
 mod preconditioner;
 mod singular_values;
@@ -31,6 +33,7 @@ pub use direct::Direct;
 pub use gmres::gmres;
 pub use incomplete::{IncompleteCholesky, IncompleteLu};
 pub use krylov::{Solved, Stop};
+pub use lanczos::bound_of_largest_eigenvalue;
 pub use null_space::{Bordered, NullSpace, Projected};
 pub use preconditioner::{BlockJacobi, Jacobi, NoPreconditioner};
 pub use singular_values::SingularValues;

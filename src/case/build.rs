@@ -7,12 +7,13 @@ mod hybrid;
 mod images;
 mod materials;
 mod outputs;
+mod remarks;
+mod steps;
 mod surfaces;
 #[cfg(test)]
 mod ties;
 
 use std::cell::RefCell;
-use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -45,15 +46,13 @@ use crate::physics::elasticity::surface::{correction_by_energy, correction_by_vo
 use crate::physics::elasticity::{Density, Elasticity, On};
 use crate::physics::failure::CriticalStretch;
 use crate::problem::Problem;
-use crate::simulation::{Model, Simulation, SolverStage, Stepper};
-use crate::solver::dynamic_relaxation::DynamicRelaxation;
+use crate::simulation::{Model, Simulation, Stepper};
+use crate::solver::Clock;
 use crate::solver::linear_solver::{self, LinearSolver, Preconditioning};
-use crate::solver::newton::Newton;
-use crate::solver::statics::Method;
-use crate::solver::{Clock, ForwardEuler, RungeKutta, Solver, Statics, VelocityVerlet};
 pub use geometry::available_memory;
 use materials::Values;
 use outputs::{force_on_set, force_through_cut, names, schedule, style, tip_window};
+use steps::StableStep;
 
 /// How a case is to be run, beside what it says itself.
 #[derive(Debug, Clone, Default)]
@@ -68,8 +67,6 @@ pub struct Options {
 
 /// Largest number of files that one output may write without being asked twice.
 const MANY_FILES: u64 = 100_000;
-/// Largest number of steps: more would take this machine longer than anybody waits.
-const MANY_STEPS: f64 = 1e15;
 /// Damage above which a point counts as damaged, where the case says nothing.
 const DAMAGED: f64 = 0.35;
 /// Steps between history rows, where the case says nothing.
@@ -266,9 +263,10 @@ impl<const D: usize> Builder<'_, D> {
         if let Some(composition) = &composition {
             elasticity.materials.clone_from(&composition.material);
         }
-        for crack in &cracks {
-            elasticity.cut(crack, tolerance);
-        }
+        let cut: Vec<u64> = cracks.iter().map(|crack| elasticity.cut(crack, tolerance)).collect();
+        self.remark_size(&elasticity.body);
+        self.remark_cracks(&elasticity.body, &cracks, &cut, tolerance);
+        self.remark_parts(&elasticity.body, &elasticity.state.states);
         let (mut constraints, mut terms) = (Vec::new(), self.mirror_forces(&elasticity.body.cloud));
         for (k, condition) in case.conditions.iter().enumerate() {
             let Elasticity { body, state, .. } = &mut elasticity;
@@ -303,6 +301,7 @@ impl<const D: usize> Builder<'_, D> {
         let (bar_speed, slowest) = (speeds().fold(0.0, f64::max), speeds().fold(f64::INFINITY, f64::min));
         if let Some(settings) = settings {
             elasticity = self.hybridise(settings, elasticity, solid, &scaling, horizon / slowest)?;
+            self.remark_hybrid(elasticity.hybrid().map_or(0.0, |work| work.standard[1]));
         }
         let stable_step = elasticity.stable_step().min(finest_step);
         let smallest = elasticity.failure.as_ref().map(CriticalStretch::smallest).filter(|s| s.is_finite());
@@ -348,12 +347,13 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// Time step, outputs, and the simulation that holds them.
-    fn finish(&self, model: Box<dyn Stepper>) -> Result<Simulation> {
+    fn finish(&self, mut model: Box<dyn Stepper>) -> Result<Simulation> {
         let case = &self.case.value;
+        let estimate = model.facts().stable_step;
+        let mut stages = self.stages(StableStep { estimate, prove: &mut || model.prove_step() })?;
         let facts = model.facts().clone();
-        let mut legs = self.legs(facts.stable_step)?;
-        let first = legs.pop_front().expect("a case has a solver");
-        let last = legs.back().unwrap_or(&first);
+        let first = stages.pop_front().expect("a case has a solver");
+        let last = stages.back().unwrap_or(&first);
         let n_steps = last.first + last.n_steps;
         let dt = last.ends / n_steps as f64;
         let folder = &self.options.folder;
@@ -403,13 +403,18 @@ impl<const D: usize> Builder<'_, D> {
                 }
             }
         }
+        // Last, since it takes a while: nothing is wrong with the case.
+        self.remark_steps(&mut *model, &std::iter::once(&first).chain(&stages).collect::<Vec<_>>());
+        let mut clock = Clock::new(first.dt);
+        clock.run_to(first.n_steps, first.ends);
         Ok(Simulation {
             title: case.case.title.clone(),
             model,
             solver: first.solver,
-            clock: Clock::new(first.dt),
+            clock,
+            longest_step: first.dt,
             n_steps,
-            stages_to_come: legs,
+            stages_to_come: stages,
             history: History::new(folder.join("history.csv"), every, tip),
             outputs,
             folder: folder.clone(),
@@ -417,77 +422,6 @@ impl<const D: usize> Builder<'_, D> {
             setup_seconds: 0.0,
             loads: self.loads.take(),
         })
-    }
-
-    /// The solvers of the case, one after another.
-    fn legs(&self, stable_step: f64) -> Result<VecDeque<SolverStage>> {
-        let (mut legs, mut step, mut time) = (VecDeque::new(), 0, 0.0);
-        for (path, chosen) in self.case.value.solver.stages() {
-            let newton = |s: &model::Statics| {
-                let linear = linear_solver(s);
-                Method::Newton(Newton { tolerance: s.tolerance, max_iterations: s.max_iterations, linear })
-            };
-            let statics = |method, linearised, breaking| Solver::Statics(Statics { method, linearised, breaking });
-            let (solver, steps) = match chosen {
-                model::Solver::VelocityVerlet(s) => {
-                    (Solver::VelocityVerlet(VelocityVerlet { damping: s.damping }), None)
-                }
-                model::Solver::RungeKutta(s) => (Solver::RungeKutta(RungeKutta { damping: s.damping }), None),
-                model::Solver::Static(s) => (statics(newton(s), true, false), Some(s.steps)),
-                model::Solver::Newton(s) => (statics(newton(s), false, false), Some(s.steps)),
-                model::Solver::QuasiStatic(s) => (statics(newton(s), false, true), Some(s.steps)),
-                model::Solver::DynamicRelaxation(s) => {
-                    let method = DynamicRelaxation { tolerance: s.tolerance, max_iterations: s.max_iterations };
-                    (statics(Method::DynamicRelaxation(method), false, false), Some(s.steps))
-                }
-                model::Solver::ForwardEuler(_) => (Solver::ForwardEuler(ForwardEuler), None),
-            };
-            let length = chosen.end_time() - time;
-            let (dt, n_steps) = match (chosen, steps) {
-                (model::Solver::VelocityVerlet(s) | model::Solver::RungeKutta(s), _) => {
-                    self.time_steps((s.safety, s.time_step), &path, length, stable_step * solver.stability())?
-                }
-                (model::Solver::ForwardEuler(s), _) => {
-                    self.time_steps((s.safety, s.time_step), &path, length, stable_step * solver.stability())?
-                }
-                (_, steps) => (length / steps.unwrap_or(1) as f64, steps.unwrap_or(1)),
-            };
-            let ends = time + n_steps as f64 * dt;
-            legs.push_back(SolverStage { solver, dt, n_steps, first: step, ends });
-            (step, time) = (step + n_steps, ends);
-        }
-        Ok(legs)
-    }
-
-    /// Δt and the number of steps, from `safety` and `time_step` as far as they are given.
-    fn time_steps(
-        &self,
-        (safety, time_step): (Option<f64>, Option<f64>),
-        path: &str,
-        length: f64,
-        stable_step: f64,
-    ) -> Result<(f64, u64)> {
-        let (dt, n_steps) = match time_step {
-            Some(dt) => {
-                if dt > stable_step {
-                    let message =
-                        format!("the time step is above the stable step {stable_step:.4e} s of this discretisation");
-                    let help = "give a smaller one, or `safety = 0.8` instead of `time_step`";
-                    return Err(self.refuse(&format!("{path}.time_step"), message, help));
-                }
-                (dt, (length / dt - 1e-9).ceil().max(1.0))
-            }
-            None => {
-                let n = (length / (stable_step * safety.unwrap_or(SAFETY))).ceil().max(1.0);
-                (length / n, n)
-            }
-        };
-        if n_steps > MANY_STEPS {
-            let message =
-                format!("this would take {n_steps:.3e} steps of {dt:.3e} s; at most {MANY_STEPS:.0e} are taken");
-            return Err(self.refuse(&format!("{path}.end_time"), message, "is the unit right?"));
-        }
-        Ok((dt, n_steps as u64))
     }
 }
 

@@ -4,6 +4,7 @@ mod diffusion;
 mod elasticity;
 mod images;
 mod materials;
+mod plausible;
 mod surfaces;
 
 use std::collections::BTreeSet;
@@ -175,6 +176,7 @@ impl Checker<'_> {
                 _ => {}
             }
         }
+        self.plausible(case);
         self.images(case);
         self.solvers(case);
         self.outputs(case, imported, &mut used);

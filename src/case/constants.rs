@@ -8,6 +8,9 @@
 //!
 //! A constant may use constants written below it; a circle is a mistake. Constants carry no
 //! dimension: they are SI numbers, and so is every expression of them.
+//!
+//! A number before a name is a number with a unit, and not a product. Where the name is that of a constant too, nobody can
+//! tell which is meant: that is a mistake, unless both are the same, as of `mm = "1 mm"`.
 
 use std::collections::{HashMap, HashSet};
 
@@ -61,6 +64,11 @@ impl Constants {
         if parsed.is_err() && (variables.contains(&word) || self.known.iter().any(is_known)) {
             return None;
         }
+        if parsed.is_ok()
+            && let Some(name) = self.unit_and_constant(unit_text)
+        {
+            return Some(Err(either_of_two(number, unit_text, name, text.len())));
+        }
         let is_right = |unit: &Unit| wanted.is_none_or(|wanted| wanted == unit.dimension);
         let mut others = names(unit_text).skip(1);
         if !parsed.as_ref().is_ok_and(is_right)
@@ -76,6 +84,18 @@ impl Constants {
                 .ok_or_else(|| Mistake::Unit(UnitError { message: "the number cannot be read".to_owned(), help: None }))
         });
         Some(value)
+    }
+
+    /// The first name of a unit that can be read as a product of constants too, with another value.
+    fn unit_and_constant<'t>(&self, unit: &'t str) -> Option<&'t str> {
+        let constant = |name: &str| self.known.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
+        let all = names(unit).all(|name| constant(name).is_some() || self.failed.contains(name));
+        let differs = |name: &&str| {
+            let of_unit = Unit::parse(name).ok().and_then(|unit| unit.to_si("1"));
+            // Of a unit that is not a power of ten a rounding.
+            of_unit.zip(constant(name)).is_none_or(|(a, b)| (a - b).abs() > 4.0 * f64::EPSILON * a.abs())
+        };
+        names(unit).find(differs).filter(|_| all)
     }
 
     /// Compiles a formula of the given variables.
@@ -174,10 +194,10 @@ impl<'a> Evaluation<'a> {
         }
         self.state[index] = State::Open;
         chain.push(&entry.key);
-        if let NodeValue::Text(text) = &entry.node.value
-            && split_quantity(text).is_none()
-        {
-            for name in names(text) {
+        if let NodeValue::Text(text) = &entry.node.value {
+            // `mm = "1 mm"` does not need itself.
+            let is_quantity = split_quantity(text).is_some();
+            for name in names(text).filter(|name| !is_quantity || *name != entry.key) {
                 if let Some(&needed) = self.by_name.get(name) {
                     self.visit(needed, chain);
                 }
@@ -244,6 +264,15 @@ impl<'a> Evaluation<'a> {
         let diagnostic = Diagnostic::error(place, &path, message);
         self.diagnostics.push(more(diagnostic));
     }
+}
+
+/// `100 h` where h is a constant.
+fn either_of_two(number: &str, unit: &str, name: &str, end: usize) -> Mistake {
+    let message =
+        format!("`{name}` is a constant of this case and a unit too: a number before it is read as one in that unit");
+    let product = unit.split_whitespace().collect::<Vec<_>>().join("*");
+    let help = format!("write `{number}*{product}` for the product; for the unit, give the constant another name");
+    Mistake::Expression(ExpressionError { message, start: 0, end, help: Some(help) })
 }
 
 fn unit_in_formula(start: usize, end: usize) -> Mistake {

@@ -63,6 +63,20 @@ pub struct Header {
     /// Dimension of space.
     #[schemars(range(min = 1, max = 3))]
     pub dimension: usize,
+    /// Whether numbers are in SI units, or in none: then nobody wonders at their size.
+    #[serde(default)]
+    pub units: Units,
+}
+
+/// What numbers of a case are in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Units {
+    /// SI units.
+    #[default]
+    Si,
+    /// None: they are ratios to quantities that the user knows, or of a consistent system of other units.
+    None,
 }
 
 /// Something that acts on the points of a set, exactly one of `initial`, `prescribe`, `load`; or what is beyond an end of the
@@ -75,14 +89,14 @@ pub struct Condition {
     pub on: Option<String>,
     /// Values at t = 0.
     pub initial: Option<Motion>,
-    /// Values imposed while t ≤ until.
+    /// Values imposed up to `until`.
     pub prescribe: Option<Motion>,
     pub load: Option<Load>,
     /// The body goes on as its own image beyond a plane.
     pub mirror: Option<Mirror>,
     /// The body goes on beyond its end as it begins.
     pub periodic: Option<Periodic>,
-    /// When a prescribed value is released or a load ends.
+    /// When a prescribed value is released or a load ends: a step ends there.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
     pub until: Option<f64>,
 }

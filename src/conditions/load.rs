@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Booked, FormulaAtPoints, Scale, Spread, Term, Volumes};
+use super::{Booked, FormulaAtPoints, Moment, Scale, Spread, Term, Volumes, acts_from, acts_to};
 use crate::field::Number;
 use crate::refinement::Remap;
 use crate::unknown::{Component, Unknown, with};
@@ -44,10 +44,11 @@ impl Load {
         Load { spread: Some(spread), ..Load::new(slots.into(), component, profile) }
     }
 
-    fn apply<T: Number>(&mut self, t: f64, dt: f64, displacement: &[T], force: &mut [T]) -> Booked {
-        let active = t <= self.until;
-        let values = self.profile.at(t);
+    fn apply<T: Number>(&mut self, at: &Moment, displacement: &[T], force: &mut [T]) -> Booked {
+        let active = at.acts(self.until);
+        let values = self.profile.at(at.t);
         let density = density(&self.scale, self.spread.as_ref(), &self.volume);
+        let [start, end] = at.weights;
         let mut booked = Booked { component: self.component, ..Booked::default() };
         let first = self.force.is_empty();
         self.force.resize(self.slots.len(), 0.0);
@@ -57,9 +58,9 @@ impl Load {
             let b = if active { density(k, values) } else { 0.0 };
             let u = displacement[slot].to_f64();
             if !first {
-                let mean = 0.5 * (self.force[k] + b) * self.volume.of(k);
-                booked.work += mean * (u - self.displacement[k]);
-                booked.impulse += mean * dt;
+                let volume = self.volume.of(k);
+                booked.work += 0.5 * (self.force[k] + b) * volume * (u - self.displacement[k]);
+                booked.impulse += (start * self.force[k] + end * b) * volume * at.dt;
             }
             force[slot] = T::from_f64(force[slot].to_f64() + b);
             self.force[k] = b;
@@ -91,11 +92,25 @@ fn density<'a>(scale: &'a Scale, spread: Option<&'a Spread>, volume: &'a Scale) 
 }
 
 impl Term for Load {
-    fn add(&mut self, t: f64, dt: f64, to: &mut Unknown<'_>) -> Booked {
+    fn add(&mut self, at: &Moment, to: &mut Unknown<'_>) -> Booked {
         with!(to, vectors => {
             let Component { value, rate, .. } = vectors.component(self.component, to.components);
-            self.apply(t, dt, value, rate)
+            self.apply(at, value, rate)
         })
+    }
+
+    fn ends_at(&self, t: f64) -> bool {
+        acts_to(self.until, t) && !acts_from(self.until, t)
+    }
+
+    fn take_away(&mut self, from: &mut Unknown<'_>) {
+        with!(from, vectors => {
+            let rate = vectors.component(self.component, from.components).rate;
+            for (&slot, b) in self.slots.iter().zip(&mut self.force) {
+                let rate = &mut rate[slot as usize];
+                *rate = Number::from_f64(rate.to_f64() - std::mem::take(b));
+            }
+        });
     }
 
     fn book(&self, weight: f64, of: &mut Unknown<'_>) -> Booked {
@@ -108,7 +123,7 @@ impl Term for Load {
     }
 
     fn force(&mut self, t: f64, load: &mut [f64], n: usize) {
-        if t > self.until {
+        if !acts_to(self.until, t) {
             return;
         }
         let component = &mut load[self.component * n..][..n];

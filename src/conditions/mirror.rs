@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use super::{Booked, Scale, Term, Volumes};
+use super::{Booked, Moment, Scale, Term, Volumes};
 use crate::field::Number;
 use crate::parallel;
 use crate::refinement::Remap;
@@ -48,21 +48,22 @@ impl MirrorForce {
         parallel::map(self.slots.len().div_ceil(CHUNK), &chunk).iter().sum()
     }
 
-    /// Impulse over the last `dt` (s), as the solver has it: velocity Verlet trapezoidal, forward Euler of the start.
-    fn note<T: Number>(&mut self, dt: f64, vectors: &Vectors<'_, T>, components: usize) -> Booked {
+    /// Impulse over the last step, as the solver has it: velocity Verlet of both its ends, forward Euler of the start.
+    fn note<T: Number>(&mut self, at: &Moment, vectors: &Vectors<'_, T>, components: usize) -> Booked {
         let n = vectors.rate.len() / components;
         let now = self.sum(&vectors.rate[self.component * n..][..n]);
-        let mean = if vectors.velocity.is_empty() { self.force } else { 0.5 * (self.force + now) };
-        let impulse = if self.known { mean * dt } else { 0.0 };
+        let [start, end] = at.weights;
+        let mean = if vectors.velocity.is_empty() { self.force } else { start * self.force + end * now };
+        let impulse = if self.known { mean * at.dt } else { 0.0 };
         (self.force, self.known) = (now, true);
         Booked { work: 0.0, impulse, component: self.component }
     }
 }
 
 impl Term for MirrorForce {
-    fn add(&mut self, _: f64, dt: f64, to: &mut Unknown<'_>) -> Booked {
+    fn add(&mut self, at: &Moment, to: &mut Unknown<'_>) -> Booked {
         let components = to.components;
-        with!(to, vectors => self.note(dt, vectors, components))
+        with!(to, vectors => self.note(at, vectors, components))
     }
 
     fn book(&self, weight: f64, _: &mut Unknown<'_>) -> Booked {

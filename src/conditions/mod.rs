@@ -3,6 +3,7 @@
 //! A condition of the case is compiled against a body into one of two things: a [`Constraint`] sets values, a [`Term`] adds
 //! to the rate. Both speak one dialect whatever solver asks, and say what they did: that is booked.
 
+pub mod damping;
 pub mod initial;
 pub mod load;
 pub mod mirror;
@@ -49,6 +50,63 @@ pub struct Instant {
     pub dt: f64,
     /// c, 1/s, of damping proportional to mass.
     pub damping: f64,
+}
+
+impl Instant {
+    /// What damping does in the step.
+    pub fn damped(&self) -> damping::DampedStep {
+        damping::DampedStep::new(self.damping, self.dt)
+    }
+}
+
+/// For what a term is asked for its part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// s
+    pub t: f64,
+    /// The step that led here from where it was last asked, s; zero where none did.
+    pub dt: f64,
+    /// What the method of the step counts of the force at its start and at its end.
+    pub weights: [f64; 2],
+    pub use_of: Use,
+}
+
+/// What a rate is used for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Use {
+    /// The step that ends at this time, s.
+    Step(f64),
+    /// What comes next.
+    Next,
+}
+
+impl Moment {
+    /// What comes after time `t`.
+    pub fn next(t: f64) -> Self {
+        Moment { t, dt: 0.0, weights: [0.5; 2], use_of: Use::Next }
+    }
+
+    /// Whether a condition that ends at `until` acts.
+    fn acts(&self, until: f64) -> bool {
+        match self.use_of {
+            Use::Step(end) => acts_to(until, end),
+            Use::Next => acts_from(until, self.t),
+        }
+    }
+}
+
+/// Of `until`: times that are sums of steps reach it to rounding only.
+const SLACK: f64 = 1e-9;
+
+/// Whether a condition that ends at `until` acts in all of a step that ends at `end`. A step ends at every `until`, so that it
+/// acts in all of a step or not at all.
+fn acts_to(until: f64, end: f64) -> bool {
+    end <= until * (1.0 + SLACK)
+}
+
+/// Whether it acts after `t`.
+fn acts_from(until: f64, t: f64) -> bool {
+    t < until * (1.0 - SLACK)
 }
 
 /// Work (J) and impulse (N·s) of what a condition did; of what diffuses, the impulse is the amount that came in.
@@ -114,9 +172,15 @@ pub trait Constraint: Send {
 
 /// Adds to the rate: a load, a source.
 pub trait Term: Send {
-    /// Adds its part at time `t`. Gives work and impulse of the last `dt`, by the trapezoidal rule in time, which is what
-    /// velocity Verlet does to momentum and, to second order, to energy.
-    fn add(&mut self, t: f64, dt: f64, to: &mut Unknown<'_>) -> Booked;
+    /// Adds its part. Gives work and impulse of the step that led there: the impulse by the weights of its method, as velocity
+    /// Verlet does to momentum, the work by the trapezoidal rule, which is what it does to energy to second order.
+    fn add(&mut self, at: &Moment, to: &mut Unknown<'_>) -> Booked;
+    /// Whether it ends at `t`.
+    fn ends_at(&self, _t: f64) -> bool {
+        false
+    }
+    /// Takes what it added last away again.
+    fn take_away(&mut self, _from: &mut Unknown<'_>) {}
     /// Work and impulse of what was last added, over `weight` (s) of the motion as it is.
     fn book(&self, weight: f64, of: &mut Unknown<'_>) -> Booked;
     /// What it added before does not lead to what it adds next.

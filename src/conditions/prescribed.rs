@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{Booked, Constraint, FormulaAtPoints, Instant, Scale, Stage, Volumes};
+use super::profile::{FOURTH_ORDER, SECOND_ORDER};
+use super::{Booked, Constraint, FormulaAtPoints, Instant, Scale, Stage, Volumes, acts_from, acts_to};
 use crate::field::Number;
 use crate::refinement::Remap;
 use crate::unknown::{Component, Unknown, with};
@@ -41,9 +42,6 @@ pub struct Prescribed {
     so_far: f64,
 }
 
-/// Of `until`: times that are sums of steps reach it to rounding only.
-const SLACK: f64 = 1e-9;
-
 impl Prescribed {
     /// Holds for ever.
     pub fn new(
@@ -68,15 +66,10 @@ impl Prescribed {
         }
     }
 
-    /// Whether it goes on holding after `t`.
-    fn goes_on(&self, t: f64) -> bool {
-        t < self.until * (1.0 - SLACK)
-    }
-
     fn at<T: Number>(&mut self, at: &Instant, inertia: f64, on: &mut Component<'_, T>) -> Booked {
         let mut booked = match at.stage {
             Stage::Start => {
-                if self.goes_on(at.t) {
+                if acts_from(self.until, at.t) {
                     self.start(at.t, on);
                 }
                 Booked::default()
@@ -134,7 +127,7 @@ impl Prescribed {
     /// Sets the values at the end of a step of first order. What came in is what they lack.
     fn arrive_at_first_order<T: Number>(&mut self, at: &Instant, value: &mut [T]) -> Booked {
         let (mut booked, end) = (Booked::default(), at.t + at.dt);
-        if self.quantity == Quantity::Value && end <= self.until {
+        if self.quantity == Quantity::Value && acts_to(self.until, end) {
             for (k, (&slot, g)) in self.slots.iter().zip(self.profile.at(end)).enumerate() {
                 let value = &mut value[slot as usize];
                 booked.impulse += (g - value.to_f64()) * self.volume.of(k);
@@ -148,7 +141,7 @@ impl Prescribed {
     /// Sets the velocities with which the set drifts over the step from `t` to `t + dt`, and where they lead from the
     /// displacements at its start.
     fn drift<T: Number>(&mut self, t: f64, dt: f64, on: &mut Component<'_, T>) {
-        if t + dt > self.until {
+        if !acts_to(self.until, t + dt) {
             return;
         }
         let at = match self.quantity {
@@ -168,11 +161,11 @@ impl Prescribed {
 
     /// Sets the velocities at the end of the step and accounts for the reaction over the step: its impulse is the change
     /// of momentum less the impulse of all other forces, its work the change of kinetic energy less theirs. Damping, an
-    /// inner force −ρ c v, counts among the others by the trapezoidal rule, as velocity Verlet applies it.
+    /// inner force −ρ c v, counts among the others as velocity Verlet applies it: it takes the momentum ρ c Δu.
     fn finish<T: Number>(&mut self, at: &Instant, inertia: f64, on: &mut Component<'_, T>) -> Booked {
         let Instant { t, dt, damping, .. } = *at;
         let mut booked = Booked::default();
-        if t > self.until {
+        if !acts_to(self.until, t) {
             self.reaction = 0.0;
             return booked;
         }
@@ -183,24 +176,25 @@ impl Prescribed {
                 }
             }
             Quantity::Value => {
-                // The slope of the formula at t, by a central difference over the step.
-                let after = self.profile.at(t + 0.5 * dt).to_vec();
-                for ((&slot, before), after) in self.slots.iter().zip(self.profile.at(t - 0.5 * dt)).zip(&after) {
-                    on.velocity[slot as usize] = T::from_f64((after - before) / dt);
+                // The slope of the formula at t, by a central difference over the step where it goes on.
+                for (&slot, v) in self.slots.iter().zip(self.profile.slope(t, 0.5 * dt, &SECOND_ORDER)) {
+                    on.velocity[slot as usize] = T::from_f64(v);
                 }
             }
         }
+        let damped = at.damped();
+        let ([start, end], [ends, middle]) = (damped.weights(), damped.energy());
         let [us, vs, fs] = &mut self.last;
         for (k, ((&slot, u_last), (v_last, f_last))) in self.slots.iter().zip(us).zip(vs.iter_mut().zip(fs)).enumerate()
         {
             let (slot, volume) = (slot as usize, self.volume.of(k));
             let [u, v, f] = [on.value[slot], on.velocity[slot], on.rate[slot]].map(T::to_f64);
-            let mean = 0.5 * (f + *f_last);
-            let inertia = on.inertia(inertia, slot);
-            let damped = 0.5 * inertia * damping * dt;
-            booked.impulse += (inertia * (v - *v_last) + damped * (v + *v_last) - mean * dt) * volume;
+            let (inertia, way) = (on.inertia(inertia, slot), u - *u_last);
+            let others = (start * *f_last + end * f) * dt - inertia * damping * way;
+            booked.impulse += (inertia * (v - *v_last) - others) * volume;
             let kinetic = 0.5 * inertia * (v * v - *v_last * *v_last);
-            booked.work += (kinetic + damped * (v * v + *v_last * *v_last) - mean * (u - *u_last)) * volume;
+            let lost = 0.5 * inertia * (ends * (v * v + *v_last * *v_last) + 2.0 * middle * (way / dt).powi(2));
+            booked.work += (kinetic + lost - 0.5 * (f + *f_last) * way) * volume;
             (*u_last, *v_last, *f_last) = (u, v, f);
         }
         self.reaction = booked.impulse / dt;
@@ -210,7 +204,7 @@ impl Prescribed {
     /// Sets the values of time `t` at a stage of a step of `dt` that ends at `end`, where other stages lead from it. A
     /// prescribed velocity is integrated by the solver, as any other.
     fn stage<T: Number>(&mut self, t: f64, end: f64, dt: f64, on: &mut Component<'_, T>) {
-        if end > self.until {
+        if !acts_to(self.until, end) {
             return;
         }
         match self.quantity {
@@ -221,15 +215,10 @@ impl Prescribed {
             }
             Quantity::Value => {
                 // The slope of the formula at t, of fourth order as the method.
-                let mut slope = vec![0.0; self.slots.len()];
-                for (at, weight) in [(-1.0, 1.0), (-0.5, -8.0), (0.5, 8.0), (1.0, -1.0)] {
-                    for (slope, u) in slope.iter_mut().zip(self.profile.at(t + at * dt)) {
-                        *slope += weight * u / (6.0 * dt);
-                    }
-                }
-                for ((&slot, v), u) in self.slots.iter().zip(&slope).zip(self.profile.at(t)) {
+                let slope = self.profile.slope(t, 0.5 * dt, &FOURTH_ORDER);
+                for ((&slot, v), u) in self.slots.iter().zip(slope).zip(self.profile.at(t)) {
                     on.value[slot as usize] = T::from_f64(*u);
-                    on.velocity[slot as usize] = T::from_f64(*v);
+                    on.velocity[slot as usize] = T::from_f64(v);
                 }
             }
         }
@@ -241,7 +230,7 @@ impl Prescribed {
         let mut booked = Booked::default();
         let so_far = std::mem::take(&mut self.so_far);
         let Instant { t, dt, .. } = *at;
-        if t > self.until {
+        if !acts_to(self.until, t) {
             self.reaction = 0.0;
             return booked;
         }
@@ -272,7 +261,7 @@ impl Prescribed {
 
     fn take_off<T: Number>(&mut self, weight: f64, at: &Instant, inertia: f64, on: &Component<'_, T>) -> Booked {
         let mut booked = Booked { component: self.component, ..Booked::default() };
-        if at.t > self.until {
+        if !acts_to(self.until, at.t) {
             return booked;
         }
         for (k, &slot) in self.slots.iter().enumerate() {
@@ -307,7 +296,7 @@ impl Constraint for Prescribed {
     }
 
     fn holds(&self, t: f64) -> bool {
-        t <= self.until * (1.0 + SLACK)
+        acts_to(self.until, t)
     }
 
     fn way(&mut self, [from, t]: [f64; 2], u: &[f64], way: &mut [f64], n: usize) {

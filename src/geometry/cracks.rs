@@ -68,6 +68,28 @@ impl<const D: usize> Crack<D> {
         self.blade(tolerance).cuts(a, b)
     }
 
+    /// Whether a point lies on the crack, its ends and edges included. `tolerance` as of [`cuts`](Self::cuts).
+    pub fn holds(&self, x: &Vector<D>, tolerance: f64) -> bool {
+        match self {
+            Crack::Point(at) => (x[0] - at).abs() <= tolerance,
+            Crack::Polyline(vertices) => {
+                let x = [x[0], x[1]];
+                vertices.windows(2).any(|e| distance(&x, &closest_on_segment(&e[0], &e[1], &x)) <= tolerance)
+            }
+            Crack::Polygon(vertices) => {
+                let (x, plane) = ([x[0], x[1], x[2]], Plane::through(vertices));
+                let flat = edges(vertices).map(|(p, q)| (plane.flatten(p), plane.flatten(q)));
+                let on_edge = |(p, q): ([f64; 3], [f64; 3])| distance(&x, &closest_on_segment(&p, &q, &x)) <= tolerance;
+                plane.height(x).abs() <= tolerance
+                    && (polygon_side(flat, plane.flatten(x)) < 0.0 || edges(vertices).any(on_edge))
+            }
+            Crack::Disc { center, normal, radius } => {
+                let away = difference(&[x[0], x[1], x[2]], center);
+                (dot(normal, &away) / norm(normal)).abs() <= tolerance && norm(&away) <= radius + tolerance
+            }
+        }
+    }
+
     /// What asks many bonds whether this crack cuts them. `tolerance` as of [`cuts`](Self::cuts).
     pub fn blade(&self, tolerance: f64) -> Blade<'_, D> {
         let (mut low, mut high) = self.bounds();
@@ -698,6 +720,23 @@ mod tests {
         assert!(!cuts([1.0, 1.0, 1.0], [1.0, 1.0, 2.0]));
         assert!(!cuts([1.0, 1.0, 1.0], [1.0, 2.0, 1.0]));
         assert_eq!(disc.bounds(), ([-5.0, -5.0, 1.0], [5.0, 5.0, 1.0]));
+    }
+
+    #[test]
+    fn points_on_a_crack_are_those_on_it_and_on_its_ends() {
+        let on = |crack: &Crack<2>, x: [f64; 2]| crack.holds(&x, 1e-9);
+        let path = Crack::Polyline(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+        assert!(on(&path, [0.0, 0.0]) && on(&path, [0.5, 0.0]) && on(&path, [1.0, 0.7]) && on(&path, [1.0, 1.0]));
+        assert!(!on(&path, [-1e-8, 0.0]) && !on(&path, [0.5, 1e-8]) && !on(&path, [1.0, 1.1]));
+        let square = [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5], [1.0, 1.0, 0.5], [0.0, 1.0, 0.5]].to_vec();
+        let disc = Crack::<3>::Disc { center: [0.5, 0.5, 0.5], normal: [0.0, 0.0, 2.0], radius: 0.5 };
+        for crack in [Crack::<3>::Polygon(square), disc] {
+            for (x, expected) in [([0.5, 0.5, 0.5], true), ([0.5, 0.0, 0.5], true), ([0.5, 0.5, 0.6], false)] {
+                assert_eq!(crack.holds(&x, 1e-9), expected, "{crack:?} {x:?}");
+            }
+            assert!(!crack.holds(&[1.5, 0.5, 0.5], 1e-9));
+        }
+        assert!(Crack::<1>::Point(0.5).holds(&[0.5], 0.0) && !Crack::<1>::Point(0.5).holds(&[0.6], 1e-9));
     }
 
     #[test]

@@ -48,6 +48,10 @@ pub trait Physics: Send {
     fn has_drifted(&mut self) {}
     /// Largest stable step, s: of velocity Verlet for equations of second order, of forward Euler for those of first.
     fn stable_step(&self) -> f64;
+    /// Whether its frequencies, or rates of decay, only fall as it breaks.
+    fn only_softens(&self) -> bool {
+        true
+    }
 
     /// A field at these points, in point order; None if there is no such field.
     fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field>;

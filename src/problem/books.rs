@@ -2,6 +2,7 @@
 
 use super::{LOOKS, Problem};
 use crate::conditions::Booked;
+use crate::conditions::damping::DampedStep;
 use crate::physics::{Balance, Content};
 use crate::visit::Visitor;
 
@@ -35,14 +36,15 @@ impl Ledger {
         self.impulse[booked.component] += booked.impulse;
     }
 
-    /// Books what damping proportional to mass took over a step of `dt` that ends with this motion: ρ c v² a second, and
-    /// ρ c v of momentum, trapezoidal in time, as the forces.
-    pub fn damp(&mut self, damping: f64, dt: f64, (kinetic, momentum): (f64, [f64; 3])) {
-        self.damped += damping * dt * (self.kinetic + kinetic);
+    /// Books what damping proportional to mass took over a step, from the motion at its mean velocities and at its end: ρ c Δu
+    /// of momentum.
+    pub fn damp(&mut self, damped: &DampedStep, mean: (f64, [f64; 3]), end: (f64, [f64; 3])) {
+        let [ends, middle] = damped.energy();
+        self.damped += ends * (self.kinetic + end.0) + 2.0 * middle * mean.0;
         for d in 0..3 {
-            self.impulse[d] -= 0.5 * damping * dt * (self.momentum[d] + momentum[d]);
+            self.impulse[d] -= damped.y * mean.1[d];
         }
-        (self.kinetic, self.momentum) = (kinetic, momentum);
+        (self.kinetic, self.momentum) = end;
     }
 
     pub fn visit(&mut self, visitor: &mut dyn Visitor) {
@@ -71,7 +73,7 @@ impl Problem {
     }
 
     /// Books what dissipation inside the body has taken since the last look, every so many steps; `first` opens the books.
-    pub(super) fn book_dissipation(&mut self, step: u64, dt: f64, first: bool) {
+    pub(super) fn book_dissipation(&mut self, step: u64, t: f64, first: bool) {
         let due = first || step.is_multiple_of(LOOKS);
         if !due || !self.physics.dissipates() {
             return;
@@ -80,9 +82,10 @@ impl Problem {
         let Some(power) = self.physics.dissipation() else { return };
         if !first {
             // Trapezoidal in time.
-            self.ledger.damped += 0.5 * (self.dissipation + power) * LOOKS as f64 * dt;
+            let [before, since] = self.dissipation;
+            self.ledger.damped += 0.5 * (before + power) * (t - since);
         }
-        self.dissipation = power;
+        self.dissipation = [power, t];
     }
 
     /// The energies and momenta now.

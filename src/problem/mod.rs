@@ -5,6 +5,7 @@
 
 mod books;
 mod rest;
+mod stability;
 mod watch;
 
 use std::ops::Range;
@@ -12,7 +13,8 @@ use std::ops::Range;
 pub use crate::physics::{Adapted, Balance};
 use books::Ledger;
 
-use crate::conditions::{Booked, Constraint, Instant, Scale, Stage, Term};
+use crate::conditions::damping::DampedStep;
+use crate::conditions::{Booked, Constraint, Instant, Moment, Scale, Stage, Term, Use};
 use crate::error::Result;
 use crate::field::Field;
 use crate::physics::{Physics, Points};
@@ -35,14 +37,16 @@ pub struct Problem {
     ledger: Ledger,
     /// c of the solver in use, 1/s: the books need it.
     damping: f64,
-    /// What dissipation inside the body took at the last look, W.
-    dissipation: f64,
+    /// What dissipation inside the body took at the last look, W, and when that was, s.
+    dissipation: [f64; 2],
     stages: Memory,
     /// What the load steps took, of static solvers.
     pub load_steps: Vec<LoadStep>,
     /// Whether a static solver advances it: the body starts without motion, and prescribed values are the solver's to
     /// impose.
     pub is_static: bool,
+    /// The largest step that has been proven stable, s, where somebody asked.
+    pub stable_step: Option<f64>,
 }
 
 impl Problem {
@@ -55,10 +59,11 @@ impl Problem {
             pending_kick: None,
             ledger: Ledger::default(),
             damping: 0.0,
-            dissipation: 0.0,
+            dissipation: [0.0; 2],
             stages: Memory::default(),
             load_steps: Vec::new(),
             is_static: false,
+            stable_step: None,
         };
         problem.measure();
         problem
@@ -157,10 +162,16 @@ impl Problem {
                         self.book_motion(squares);
                     }
                     self.pending_kick = Some((*verlet, clock.dt));
-                } else {
+                } else if verlet.damping == 0.0 {
                     verlet.step(self, clock);
-                    let motion = self.physics.motion();
-                    self.ledger.damp(verlet.damping, clock.dt, motion);
+                    (self.ledger.kinetic, self.ledger.momentum) = self.physics.motion();
+                } else {
+                    verlet.stride(self, clock, false);
+                    let mean = self.physics.motion();
+                    verlet.finish(self, clock.dt);
+                    self.constrain(Stage::Finish, clock.time(), clock.dt);
+                    let end = self.physics.motion();
+                    self.ledger.damp(&DampedStep::new(verlet.damping, clock.dt), mean, end);
                 }
             }
             Solver::RungeKutta(method) => {
@@ -182,7 +193,8 @@ impl Problem {
             self.catch_up();
             self.watch(solver, clock)?;
         }
-        self.book_dissipation(clock.step, clock.dt, false);
+        self.book_dissipation(clock.step, clock.time(), false);
+        self.end_terms(clock.time());
         if self.physics.adapts_every().is_some_and(|every| clock.step.is_multiple_of(every)) {
             self.adapt(clock.time(), false);
         }
@@ -212,15 +224,27 @@ impl Problem {
         }
     }
 
-    /// Adds the loads of time `t` to the rate. Gives the work and impulse of each over the last `dt`.
-    fn load(&mut self, t: f64, dt: f64) -> Vec<Booked> {
+    /// Adds the loads to the rate. Gives the work and impulse of each over the last step.
+    fn load(&mut self, at: &Moment) -> Vec<Booked> {
         let Problem { physics, terms, .. } = self;
-        terms.iter_mut().map(|term| term.add(t, dt, &mut physics.unknown())).collect()
+        terms.iter_mut().map(|term| term.add(at, &mut physics.unknown())).collect()
     }
 
-    /// The same, booked.
+    /// The same at time `t`, `dt` after the last, by velocity Verlet, booked.
     fn load_and_book(&mut self, t: f64, dt: f64) {
-        self.load(t, dt).into_iter().for_each(|booked| self.ledger.book(booked));
+        let weights = DampedStep::new(self.damping, dt).weights();
+        let at = if dt > 0.0 { Moment { t, dt, weights, use_of: Use::Step(t) } } else { Moment::next(t) };
+        self.load(&at).into_iter().for_each(|booked| self.ledger.book(booked));
+    }
+
+    /// Takes the loads away that end at `t`, the end of a step: the next begins without them.
+    fn end_terms(&mut self, t: f64) {
+        if self.terms.iter().any(|term| term.ends_at(t)) {
+            self.catch_up();
+            let Problem { physics, terms, .. } = self;
+            let ending = terms.iter_mut().filter(|term| term.ends_at(t));
+            ending.for_each(|term| term.take_away(&mut physics.unknown()));
+        }
     }
 
     /// Books what the loads as they are bring in over `dt`, s: all that a step of forward Euler adds.
@@ -241,7 +265,7 @@ impl Problem {
             self.terms.iter_mut().for_each(|term| term.remap(remap));
         }
         self.measure();
-        self.load(t, 0.0);
+        self.load(&Moment::next(t));
         self.impose(Stage::Replaced, t, 0.0);
         self.ledger.refined += replaced.energy;
         (self.ledger.kinetic, self.ledger.momentum) = self.physics.motion();
@@ -279,7 +303,9 @@ impl Problem {
         self.terms.iter_mut().for_each(|term| term.visit(visitor));
         self.stages.visit(visitor);
         self.ledger.visit(visitor);
-        visitor.number("dissipation", &mut self.dissipation);
+        let [power, time] = &mut self.dissipation;
+        visitor.number("dissipation", power);
+        visitor.number("dissipation_time", time);
     }
 
     /// BLAKE3 of values, velocities and bonds: equal exactly when two runs have the same bits.
@@ -288,6 +314,18 @@ impl Problem {
         let mut hasher = blake3::Hasher::new();
         self.physics.hash(&mut hasher);
         hasher.finalize().to_hex().to_string()
+    }
+
+    /// Names of two constraints on the same component of a slot, if there are any.
+    pub fn contested(&self) -> Option<[&str; 2]> {
+        self.constraints.iter().enumerate().find_map(|(k, one)| {
+            let (component, slots) = one.on();
+            let shares = |other: &&Box<dyn Constraint>| {
+                let (same, others) = other.on();
+                same == component && slots.iter().any(|slot| others.binary_search(slot).is_ok())
+            };
+            self.constraints[k + 1..].iter().find(shares).map(|other| [one.name(), other.name()])
+        })
     }
 
     /// Broken pairs, pre-cracks not counted.
@@ -316,7 +354,7 @@ impl System for Problem {
         self.physics.evolve(dt);
         // Of first order the next step is what adds these loads, and books them.
         let first_order = with!(self.physics.unknown(), vectors => vectors.velocity.is_empty());
-        if first_order { drop(self.load(t, 0.0)) } else { self.load_and_book(t, dt) }
+        if first_order { drop(self.load(&Moment::next(t))) } else { self.load_and_book(t, dt) }
     }
 
     fn drift_and_evolve(&mut self, drift: &Drift, t: f64, dt: f64) -> Option<f64> {
@@ -337,7 +375,7 @@ impl Staged for Problem {
     fn stage(&mut self, t: f64, end: f64, dt: f64) {
         self.impose(Stage::Within { end }, t, dt);
         self.physics.evaluate();
-        self.load(t, 0.0);
+        self.load(&Moment { use_of: Use::Step(end), ..Moment::next(t) });
     }
 
     fn book(&mut self, share: f64, end: f64, dt: f64) {
@@ -363,6 +401,6 @@ impl Staged for Problem {
         self.impose(Stage::Arrive, t, dt);
         // A bond that breaks has acted all through the step, and takes what it holds at its end.
         self.physics.evolve(0.0);
-        self.load(t, 0.0);
+        self.load(&Moment::next(t));
     }
 }

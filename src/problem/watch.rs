@@ -36,7 +36,7 @@ impl Problem {
 
     /// Why numbers have gone bad.
     fn cause(&self, solver: &Solver, clock: &Clock) -> String {
-        let stable = solver.stability() * self.physics.stable_step();
+        let stable = solver.largest_step(self.stable_step.unwrap_or_else(|| self.physics.stable_step()));
         let loads = self.terms.iter().filter_map(|term| term.first_bad());
         let bad = loads.chain(self.constraints.iter().filter_map(|constraint| constraint.first_bad())).next();
         if let Some((formula, value)) = bad {

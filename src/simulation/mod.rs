@@ -1,5 +1,6 @@
 //! The event loop: step, look, write, until the end. The first file to read.
 
+mod imbalance;
 mod model;
 
 use std::collections::VecDeque;
@@ -39,6 +40,19 @@ pub trait Stepper: Source + Send {
     fn conclude(&mut self, _solver: &Solver, _clock: &Clock) -> Result<()> {
         Ok(())
     }
+    /// The largest step that is proven stable, s, of velocity Verlet or forward Euler; it is then that of the facts too. None
+    /// where none is.
+    fn prove_step(&mut self) -> Option<f64> {
+        None
+    }
+    /// Names of two prescribed sets that share a point and a component, if there are any.
+    fn contested(&self) -> Option<[String; 2]> {
+        None
+    }
+    /// How long it takes to sum a rate, s, by trying it before the start; None where nobody can tell.
+    fn seconds_per_rate(&mut self) -> Option<f64> {
+        None
+    }
     /// Shows everything that changes in a run but the clock.
     fn visit(&mut self, visitor: &mut dyn Visitor);
     /// What the load steps of static solvers took.
@@ -49,7 +63,7 @@ pub trait Stepper: Source + Send {
     }
 }
 
-/// A solver of a chain, and its part of the run.
+/// A solver of a chain, and steps of one length that it takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverStage {
     pub solver: Solver,
@@ -60,6 +74,8 @@ pub struct SolverStage {
     pub first: u64,
     /// Time at its end, s.
     pub ends: f64,
+    /// Whether the same solver took the steps before it.
+    pub continues: bool,
 }
 
 /// A case that is ready to run.
@@ -69,6 +85,8 @@ pub struct Simulation {
     /// The one at work.
     pub solver: Solver,
     pub clock: Clock,
+    /// The longest step that the solver at work has taken so far, s: others are shorter to end on an instant.
+    pub longest_step: f64,
     /// Of all solvers.
     pub n_steps: u64,
     /// The solvers that follow.
@@ -173,11 +191,18 @@ impl Simulation {
     /// Takes the next step, by the next solver where it is its turn. `observe`: see [`Stepper::step_observed`].
     pub fn step(&mut self, observe: &mut dyn FnMut(usize, f64) -> bool) -> Result<bool> {
         if let Some(leg) = self.stages_to_come.front().copied().filter(|leg| leg.first == self.clock.step) {
-            self.model.conclude(&self.solver, &self.clock)?;
+            if !leg.continues {
+                self.model.conclude(&self.solver, &self.clock)?;
+            }
             self.stages_to_come.pop_front();
             self.clock.change_step(leg.dt);
-            self.solver = leg.solver;
-            self.model.hand_over(&self.solver, self.clock.time());
+            self.clock.run_to(leg.first + leg.n_steps, leg.ends);
+            if leg.continues {
+                self.longest_step = self.longest_step.max(leg.dt);
+            } else {
+                (self.solver, self.longest_step) = (leg.solver, leg.dt);
+                self.model.hand_over(&self.solver, self.clock.time());
+            }
         }
         self.model.step_observed(&self.solver, &mut self.clock, observe)
     }
@@ -262,8 +287,8 @@ impl Simulation {
                 imbalance,
             }),
             steps: self.clock.step,
-            time_step: self.clock.dt,
-            stable_time_step: facts.stable_step * self.solver.stability(),
+            time_step: self.longest_step,
+            stable_time_step: self.solver.largest_step(facts.stable_step),
             end_time: self.clock.time(),
             threads: self.threads,
             wall_seconds: wall,
@@ -509,6 +534,7 @@ mod tests {
             model: Box::new(Still { points, stops_at, computed: 0 }),
             solver: Solver::VelocityVerlet(VelocityVerlet { damping: 0.0 }),
             clock: Clock::new(1.0),
+            longest_step: 1.0,
             n_steps: 20,
             stages_to_come: VecDeque::new(),
             history: History::new(folder.join("history.csv"), 5, None),

@@ -135,6 +135,17 @@ impl Stepper for Model {
     fn conclude(&mut self, solver: &Solver, clock: &Clock) -> Result<()> {
         self.problem.conclude(solver, clock)
     }
+    fn prove_step(&mut self) -> Option<f64> {
+        let proven = self.problem.prove_step();
+        self.facts.stable_step = self.facts.stable_step.max(proven.unwrap_or(0.0));
+        proven
+    }
+    fn contested(&self) -> Option<[String; 2]> {
+        self.problem.contested().map(|pair| pair.map(String::from))
+    }
+    fn seconds_per_rate(&mut self) -> Option<f64> {
+        self.problem.seconds_per_rate()
+    }
     fn visit(&mut self, visitor: &mut dyn Visitor) {
         self.problem.visit(visitor);
     }

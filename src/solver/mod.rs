@@ -34,11 +34,11 @@ impl Solver {
         matches!(self, Solver::Statics(_))
     }
 
-    /// Its largest stable step over that for which [`System::stable_step`] is estimated.
-    pub fn stability(&self) -> f64 {
+    /// Its largest stable step, s, where that of [`System::stable_step`] is `stable`.
+    pub fn largest_step(&self, stable: f64) -> f64 {
         match self {
-            Solver::RungeKutta(_) => RungeKutta::STABILITY,
-            Solver::VelocityVerlet(_) | Solver::ForwardEuler(_) | Solver::Statics(_) => 1.0,
+            Solver::RungeKutta(method) => method.largest_step(stable),
+            Solver::VelocityVerlet(_) | Solver::ForwardEuler(_) | Solver::Statics(_) => stable,
         }
     }
 }
@@ -51,6 +51,8 @@ pub struct Clock {
     pub dt: f64,
     /// The step from which on steps have this length, and its time (s).
     since: (u64, f64),
+    /// The last step of this length, and the time (s) at which it ends, to the last bit.
+    until: (u64, f64),
 }
 
 impl Clock {
@@ -61,23 +63,36 @@ impl Clock {
 
     /// After so many steps of the same length.
     pub fn at(step: u64, dt: f64) -> Self {
-        Clock { step, dt, since: (0, 0.0) }
+        Clock { step, dt, since: (0, 0.0), until: (u64::MAX, f64::INFINITY) }
     }
 
     /// t, s: a product, not a sum, so that it does not drift.
     pub fn time(&self) -> f64 {
+        if self.step == self.until.0 {
+            return self.until.1;
+        }
         let (step, time) = self.since;
         time + (self.step - step) as f64 * self.dt
     }
 
     /// From here on, steps of `dt` (s).
     pub fn change_step(&mut self, dt: f64) {
-        *self = Clock { dt, since: (self.step, self.time()), ..*self };
+        *self = Clock { since: (self.step, self.time()), ..Clock::at(self.step, dt) };
+    }
+
+    /// When steps of this length end, s.
+    pub fn end(&self) -> f64 {
+        self.until.1
+    }
+
+    /// Steps of this length end with step number `step`, at `time` (s).
+    pub fn run_to(&mut self, step: u64, time: f64) {
+        self.until = (step, time);
     }
 
     /// The step that was begun ended early, at `time` (s).
     pub fn end_step_at(&mut self, time: f64) {
-        self.since = (self.step, time);
+        *self = Clock { since: (self.step, time), ..Clock::at(self.step, self.dt) };
     }
 }
 

@@ -75,9 +75,42 @@ const STAGES: [[f64; 2]; 3] = [[1.0 / 6.0, 0.5], [1.0 / 3.0, 0.5], [1.0 / 3.0, 1
 const LAST_SHARE: f64 = 1.0 / 6.0;
 
 impl RungeKutta {
-    /// The largest stable step over that of velocity Verlet: 2√2 to 2 on the imaginary axis. With damping the limit of
-    /// |λ| Δt is 2.616 at worst (for λ at 57° from the negative real axis), which `safety` at its default covers.
+    /// The largest stable step over that of velocity Verlet without damping: 2√2 to 2 on the imaginary axis.
     pub const STABILITY: f64 = std::f64::consts::SQRT_2;
+
+    /// The largest stable step, s, where that of velocity Verlet without damping is `stable`.
+    ///
+    /// A motion of frequency ω ≤ 2/`stable` has λ = −c/2 ± √(c²/4 − ω²); |1 + z + z²/2 + z³/6 + z⁴/24| ≤ 1 at z = λ Δt for all of
+    /// them. Strong damping, λ = −c, is stable to c Δt = 2.785; near the imaginary axis the bound of no damping holds.
+    pub fn largest_step(&self, stable: f64) -> f64 {
+        let undamped = Self::STABILITY * stable;
+        if self.damping == 0.0 || !undamped.is_finite() {
+            return undamped;
+        }
+        let half = 0.5 * self.damping;
+        let of = |k: u32| {
+            let omega = 2.0 / stable * f64::from(k) / f64::from(FREQUENCIES);
+            let square = half * half - omega * omega;
+            // Of two real roots the larger.
+            if square > 0.0 { [-half - square.sqrt(), 0.0] } else { [-half, (-square).sqrt()] }
+        };
+        (0..=FREQUENCIES).map(|k| stable_along(of(k))).fold(undamped, f64::min)
+    }
+
+    /// The strongest damping that a step of `dt` (s) bears, 1/s; none where it bears no motion.
+    pub fn strongest_damping(dt: f64, stable: f64) -> Option<f64> {
+        let bears = |damping: f64| dt <= RungeKutta { damping }.largest_step(stable);
+        if !bears(0.0) {
+            return None;
+        }
+        // The first that it does not bear is below what the real axis allows.
+        let (mut low, mut high) = (0.0, 3.0 / dt);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            *(if bears(middle) { &mut low } else { &mut high }) = middle;
+        }
+        Some(low)
+    }
 
     /// Advances `system` by one step.
     pub fn step<S: Staged>(&self, system: &mut S, clock: &mut Clock, memory: &mut Memory) {
@@ -110,6 +143,32 @@ impl RungeKutta {
         let limits = [unknown.negligible, slow(unknown.negligible, dt)];
         remembering!(unknown, memory, |vectors, stages| stages.finish(vectors, by, limits));
     }
+}
+
+/// Frequencies at which a damped body is asked for its stable step.
+const FREQUENCIES: u32 = 256;
+
+/// The step to which the method is stable for an eigenvalue with this real and imaginary part, 1/s.
+fn stable_along([real, imaginary]: [f64; 2]) -> f64 {
+    let size = real.hypot(imaginary);
+    let direction = [real / size, imaginary / size];
+    let grows = |r: f64| {
+        let [a, b] = direction.map(|x| r * x);
+        // 1 + z (1 + z/2 (1 + z/3 (1 + z/4)))
+        let [mut p, mut q] = [1.0, 0.0];
+        for n in [4.0, 3.0, 2.0, 1.0] {
+            [p, q] = [1.0 + (a * p - b * q) / n, (a * q + b * p) / n];
+        }
+        // On the imaginary axis it is 1 to rounding where |z| is small.
+        p * p + q * q > 1.0 + 1e-14
+    };
+    // All rays leave the region once, between 2.6 and 3.
+    let (mut low, mut high) = (2.5, 3.0);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        *(if grows(middle) { &mut high } else { &mut low }) = middle;
+    }
+    low / size
 }
 
 impl<T: Number> Stages<T> {
@@ -286,6 +345,48 @@ mod tests {
             // A few roundings a step.
             assert!((energy / (0.5 * factor.powi(10)) - 1.0).abs() < 1e-13, "{dt}: {energy}");
         }
+    }
+
+    /// Every frequency at and below the largest, with damping from weak to strong: stable at the step that is given, and not at
+    /// one that is longer.
+    #[test]
+    fn damped_oscillators_are_stable_to_the_largest_step() {
+        for c in [1e-6, 1e-2, 0.3, 1.0, 1.5, 2.0, 3.0, 10.0, 1e3] {
+            let dt = RungeKutta { damping: c }.largest_step(2.0);
+            let largest = |dt: f64| {
+                let mut worst = 0.0f64;
+                for k in 0..=100 {
+                    // ü = −ω² u − c u̇, the amplification by the two real unknowns.
+                    let w = (0.01 * f64::from(k)).powi(2);
+                    let rate = |[u, v]: [f64; 2]| [v, -w * u - c * v];
+                    let mut x = [1.0, -0.3];
+                    for _ in 0..3000 {
+                        let ahead = |k: [f64; 2], h: f64| rate([x[0] + h * k[0], x[1] + h * k[1]]);
+                        let k1 = rate(x);
+                        let k2 = ahead(k1, 0.5 * dt);
+                        let k3 = ahead(k2, 0.5 * dt);
+                        let k4 = ahead(k3, dt);
+                        x = std::array::from_fn(|d| x[d] + dt / 6.0 * (k1[d] + 2.0 * (k2[d] + k3[d]) + k4[d]));
+                    }
+                    worst = worst.max(x[1].abs());
+                }
+                worst
+            };
+            // Nothing grows: |v| ≤ the largest it can be from |x| = 1.05 at ω ≤ 1 and any c, some 2.
+            assert!(largest(0.999 * dt) < 3.0, "{c}: {dt}");
+            // Weak damping makes longer steps stable, which are not asked for.
+            if dt < 2.0 * RungeKutta::STABILITY {
+                assert!(largest(1.01 * dt) > 100.0, "{c}: {dt}");
+            }
+            let most = RungeKutta::strongest_damping(dt * (1.0 - 1e-9), 2.0).expect("a stable step");
+            // Weak damping is no limit.
+            assert!(most >= c * (1.0 - 1e-6), "{c}: {most}");
+        }
+        // The real root of 1 + z/2 + z²/6 + z³/24 = 0, by Cardano's formula.
+        let exact = 2.785293563405282;
+        let found = 1e6 * RungeKutta { damping: 1e6 }.largest_step(2.0);
+        // What a frequency of 1 takes off 1e6: 1e-12.
+        assert!((found - exact).abs() < 1e-10, "{found}");
     }
 
     #[test]

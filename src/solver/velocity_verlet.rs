@@ -2,12 +2,18 @@
 //!
 //! v(n+½) = v(n) + Δt/2 a(n); u(n+1) = u(n) + Δt v(n+½); v(n+1) = v(n+½) + Δt/2 a(n+1); Shojaei et al. 2022, eq. (29).
 //! Second order, symplectic, energy without drift. Bonds break between the drift and the new force.
+//!
+//! Damping proportional to mass is exact for forces that stay the same over a step, with y = c Δt and φ₁, φ₂ of
+//! [`DampedStep`]: v(n+½) = φ₁ v(n) + φ₂ Δt a(n), the mean velocity of the step, and
+//! v(n+1) = (e^(−y) v(n+½) + (φ₁ − φ₂) Δt a(n+1))/φ₁. An oscillation is stable to ω Δt = 2 √(½y coth ½y), which is 2 without
+//! damping and never less: no damping is too strong for a step.
 
 mod varied;
 
 use rayon::prelude::*;
 
 use super::{Clock, Stage, System};
+use crate::conditions::damping::DampedStep;
 use crate::execution::{Sweep, wide};
 use crate::field::Number;
 use crate::unknown::{Unknown, Vectors, with};
@@ -69,8 +75,9 @@ pub struct Drift {
     /// What the kicks leave of the velocity, by damping proportional to mass: the first, the last.
     keep: f64,
     after: f64,
-    /// Δt/2ρ
+    /// By which they take the force; Δt/2ρ without damping.
     factor: f64,
+    last: f64,
     dt: f64,
     /// τ
     tau: f64,
@@ -81,12 +88,14 @@ pub struct Drift {
 
 impl Drift {
     fn new(method: &VelocityVerlet, unknown: &Unknown<'_>, dt: f64, pending: bool) -> Self {
-        let half = 0.5 * method.damping * dt;
+        let damped = DampedStep::new(method.damping, dt);
+        let [first, second] = damped.phi;
         Drift {
             pending,
-            keep: 1.0 - half,
-            after: 1.0 / (1.0 + half),
-            factor: 0.5 * dt / unknown.inertia,
+            keep: first,
+            after: (-damped.y).exp() / first,
+            factor: second * dt / unknown.inertia,
+            last: (first - second) / first * dt / unknown.inertia,
             dt,
             tau: unknown.tau(),
             still: unknown.negligible,
@@ -132,20 +141,21 @@ impl Drift {
 #[derive(Debug, Clone, Copy)]
 struct Kick<T> {
     after: T,
+    last: T,
     factor: T,
     slow: T,
 }
 
 impl<T: Number> Kick<T> {
     fn new(drift: &Drift) -> Self {
-        let [after, factor, slow] = [drift.after, drift.factor, drift.slow].map(T::from_f64);
-        Kick { after, factor, slow }
+        let [after, last, factor, slow] = [drift.after, drift.last, drift.factor, drift.slow].map(T::from_f64);
+        Kick { after, last, factor, slow }
     }
 
     /// The last kick of a step; adds v².
     #[inline(always)]
     fn kicked(&self, v: T, f: T, square: &mut f64) -> T {
-        let v = unless_below(self.slow, (v + self.factor * f) * self.after);
+        let v = unless_below(self.slow, self.after * v + self.last * f);
         *square += v.to_f64() * v.to_f64();
         v
     }
@@ -314,9 +324,60 @@ mod tests {
         assert_eq!((whole.0, clock), (owing.0, other));
     }
 
+    /// A point without force, and one that is pulled: both as their equations say, however long the step.
+    #[test]
+    fn decay_and_terminal_velocity_are_exact_at_any_damping() {
+        struct Pulled([f64; 3]);
+        impl System for Pulled {
+            fn unknown(&mut self) -> Unknown<'_> {
+                let [value, velocity, rate] = self.0.each_mut().map(std::slice::from_mut);
+                let vectors = Vectors { value, velocity, rate, damped: None, relative_inertia: None };
+                Unknown { vectors: Numbers::Double(vectors), components: 1, inertia: 2.0, negligible: 0.0 }
+            }
+            fn constrain(&mut self, _: Stage, _: f64, _: f64) {}
+            fn evolve(&mut self, _: f64, _: f64) {}
+            fn stable_step(&self) -> f64 {
+                f64::INFINITY
+            }
+        }
+        for c in [1e-6, 0.01, 0.7, 1.0, 2.0, 30.0, 1e6] {
+            for force in [0.0, 3.0] {
+                let mut system = Pulled([0.0, 1.0, force]);
+                let mut clock = Clock::new(1.0);
+                for _ in 0..10 {
+                    VelocityVerlet { damping: c }.step(&mut system, &mut clock);
+                }
+                let (t, a) = (clock.time(), 0.5 * force);
+                let decayed = f64::exp_m1(-c * t);
+                let exact = [-decayed / c + (t + decayed / c) * a / c, 1.0 + decayed - decayed * a / c];
+                // A few roundings a step of numbers as large as 1/c, for (t + …)/c.
+                let allowed = 1e-14 * (1.0 + a * (1.0 + 1.0 / c / c));
+                for k in 0..2 {
+                    assert!((system.0[k] - exact[k]).abs() < allowed, "c {c}, force {force}: {:?} {exact:?}", system.0);
+                }
+            }
+        }
+    }
+
+    /// At the stable step without damping, with damping of any strength.
+    #[test]
+    fn no_damping_makes_a_stable_step_unstable() {
+        for c in [0.0, 1e-3, 0.1, 1.0, 5.0, 100.0, 1e8] {
+            let mut system = Oscillator([1.0, 0.0, -1.0]);
+            let mut clock = Clock::new(1.999);
+            let mut largest = 0.0f64;
+            for _ in 0..2000 {
+                VelocityVerlet { damping: c }.step(&mut system, &mut clock);
+                largest = largest.max(system.0[0].abs());
+            }
+            // ω Δt = 1.999 lets the amplitude grow to 1/√(1 − (ω Δt/2)²) = 31.6 without damping.
+            assert!(largest < 32.0, "{c}: {largest}");
+        }
+    }
+
     #[test]
     fn a_damped_oscillator_converges_at_second_order() {
-        for damping in [0.0, 0.5] {
+        for damping in [0.0, 0.5, 1.5] {
             let order = (error_at_one(damping, 64) / error_at_one(damping, 128)).log2();
             // Halving the step leaves terms of relative size Δt beside the leading one.
             assert!((order - 2.0).abs() < 0.05, "damping {damping}: order {order}");

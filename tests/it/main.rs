@@ -9,6 +9,7 @@ mod engine;
 mod forces;
 mod hybrid;
 mod images;
+mod limits;
 mod materials;
 mod memory;
 mod parity;

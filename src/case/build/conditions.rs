@@ -53,6 +53,12 @@ impl<const D: usize> Builder<'_, D> {
         Ok(profile)
     }
 
+    /// The end of `conditions[k]`, or of the run, s: its formulas need no value after it.
+    pub(super) fn last_instant(&self, k: usize) -> f64 {
+        let end = self.case.value.solver.stages().map(|(_, solver)| solver.end_time()).fold(0.0, f64::max);
+        self.case.value.conditions[k].until.map_or(end, |until| until.min(end))
+    }
+
     /// The motion of `conditions[k]`.
     pub(super) fn prescribed(
         &self,
@@ -72,7 +78,7 @@ impl<const D: usize> Builder<'_, D> {
             Motion::Concentration { .. } => condition.on.clone().unwrap_or_default(),
             _ => format!("{}_{}", condition.on.as_deref().unwrap_or_default(), ["x", "y", "z"][component]),
         };
-        let profile = self.profile(value, cloud, &slots, &path)?;
+        let profile = self.profile(value, cloud, &slots, &path)?.until(self.last_instant(k));
         let mut prescribed = Prescribed::new(name, slots, component, quantity, profile);
         prescribed.until = condition.until.unwrap_or(f64::INFINITY);
         Ok(Box::new(prescribed))
@@ -137,7 +143,8 @@ impl<const D: usize> Builder<'_, D> {
     ) -> Result<()> {
         let condition = &self.case.value.conditions[k];
         let name = condition.load.as_ref().map_or("", model::Load::name);
-        let profile = self.profile(value, cloud, slots, &format!("conditions[{k}].load.{name}.value"))?;
+        let path = format!("conditions[{k}].load.{name}.value");
+        let profile = self.profile(value, cloud, slots, &path)?.until(self.last_instant(k));
         let mut load = Load::new(slots.clone(), component, profile);
         (load.scale, load.until) = (scale, condition.until.unwrap_or(f64::INFINITY));
         terms.push(Box::new(load));

@@ -260,7 +260,7 @@ impl<const D: usize> Builder<'_, D> {
                 continue;
             }
             let places = pieces.iter().map(|piece| piece.place);
-            let mut profile = FormulaAtPoints::at_places(self.expression(value)?, places);
+            let mut profile = FormulaAtPoints::at_places(self.expression(value)?, places).until(self.last_instant(k));
             if let Some((bad, value)) = profile.at(0.0).iter().copied().enumerate().find(|(_, v)| !v.is_finite()) {
                 let position = rounded(&pieces[bad].place);
                 let message = format!("the formula is {value} at t = 0 on the surface at {position} m");

@@ -186,17 +186,17 @@ fn many_iterations() -> usize {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Explicit {
-    /// The instant at which it ends.
+    /// The instant at which it ends: the last step is shorter where it has to be.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
     pub end_time: f64,
     /// Δt as a fraction of the stable step that is estimated from the discretisation (0.8 if not given). Either this or
     /// `time_step`.
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
     pub safety: Option<f64>,
-    /// Δt. Must not pass the stable step.
+    /// Δt. Above the estimate of the stable step it is taken where it is proven stable.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
     pub time_step: Option<f64>,
-    /// c in ρ ü = force − ρ c u̇.
+    /// c in ρ ü = force − ρ c u̇. `velocity_verlet` bears any; `runge_kutta` c Δt up to 2.785.
     #[serde(default)]
     #[schemars(extend("x-unit" = "1/s", "minimum" = 0))]
     pub damping: f64,

@@ -329,6 +329,13 @@ impl<const D: usize, P: Packs> Physics for Elasticity<D, P> {
         self.material.stable_step(&mut on, &self.density)
     }
 
+    /// A bond of its own holds or not; the energy of a state-based point is one of its whole family, which breaking changes.
+    fn only_softens(&self) -> bool {
+        let first = self.body.cloud.slots.first();
+        let state_based = first.is_some_and(|&slot| self.material.dilatation_scales(slot as usize).is_some());
+        self.failure.is_none() || !state_based
+    }
+
     fn field(&mut self, name: &str, points: Range<usize>) -> Option<Field> {
         let (info, compute) = Self::FIELDS.iter().find(|(info, _)| info.name == name)?;
         let slots = self.body.cloud.slots[points].to_vec();

@@ -105,7 +105,7 @@ impl<T: Number> Sweep for LastKick<'_, T> {
 
 struct Pass<'a, T, const PENDING: bool> {
     kick: Kick<T>,
-    /// 1 − c Δt/2, Δt, and what counts as zero.
+    /// What damping leaves, Δt, and what counts as zero.
     by: [T; 3],
     part: Part<'a, T>,
     value: &'a mut [T],
@@ -155,7 +155,7 @@ impl<T: Number, const PENDING: bool> Pass<'_, T, PENDING> {
 /// The last kick of a step at a place; adds v² ρ/ρ₀.
 #[inline(always)]
 fn kicked<T: Number>(kick: &Kick<T>, v: T, f: T, [relative, inverse]: [T; 2], square: &mut f64) -> T {
-    let v = unless_below(kick.slow, (v + kick.factor * (f * inverse)) * kick.after);
+    let v = unless_below(kick.slow, kick.after * v + kick.last * (f * inverse));
     *square += v.to_f64() * v.to_f64() * relative.to_f64();
     v
 }
