@@ -11,6 +11,7 @@
 //! | small and dense, rank to be known | [`SingularValues`] |
 
 mod bicgstab;
+mod condensed;
 mod conjugate_gradients;
 mod direct;
 mod gmres;
@@ -26,6 +27,7 @@ pub mod vector;
 mod matrices;
 
 pub use bicgstab::bicgstab;
+pub use condensed::Condensed;
 pub use conjugate_gradients::conjugate_gradients;
 pub use direct::Direct;
 pub use gmres::gmres;
