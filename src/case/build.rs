@@ -44,7 +44,7 @@ use crate::simulation::{Model, Simulation, SolverStage, Stepper};
 use crate::solver::dynamic_relaxation::DynamicRelaxation;
 use crate::solver::linear_solver::{self, LinearSolver, Preconditioning};
 use crate::solver::newton::Newton;
-use crate::solver::statics::Method;
+use crate::solver::statics::{Breaking, Control, Method, Together};
 use crate::solver::{Clock, ForwardEuler, RungeKutta, Solver, Statics, VelocityVerlet};
 pub use geometry::available_memory;
 use materials::Values;
@@ -412,21 +412,21 @@ impl<const D: usize> Builder<'_, D> {
         let (mut legs, mut step, mut time) = (VecDeque::new(), 0, 0.0);
         for (path, chosen) in self.case.value.solver.stages() {
             let newton = |s: &model::Statics| {
-                let linear = linear_solver(s);
+                let linear = linear_solver(s.linear, s.preconditioner, s.max_linear);
                 Method::Newton(Newton { tolerance: s.tolerance, max_iterations: s.max_iterations, linear })
             };
-            let statics = |method, linearised, breaking| Solver::Statics(Statics { method, linearised, breaking });
+            let statics = |method, linearised| Solver::Statics(Statics { method, linearised, breaking: None });
             let (solver, steps) = match chosen {
                 model::Solver::VelocityVerlet(s) => {
                     (Solver::VelocityVerlet(VelocityVerlet { damping: s.damping }), None)
                 }
                 model::Solver::RungeKutta(s) => (Solver::RungeKutta(RungeKutta { damping: s.damping }), None),
-                model::Solver::Static(s) => (statics(newton(s), true, false), Some(s.steps)),
-                model::Solver::Newton(s) => (statics(newton(s), false, false), Some(s.steps)),
-                model::Solver::QuasiStatic(s) => (statics(newton(s), false, true), Some(s.steps)),
+                model::Solver::Static(s) => (statics(newton(s), true), Some(s.steps)),
+                model::Solver::Newton(s) => (statics(newton(s), false), Some(s.steps)),
+                model::Solver::QuasiStatic(s) => (Solver::Statics(quasi_static(s)), Some(s.steps)),
                 model::Solver::DynamicRelaxation(s) => {
                     let method = DynamicRelaxation { tolerance: s.tolerance, max_iterations: s.max_iterations };
-                    (statics(Method::DynamicRelaxation(method), false, false), Some(s.steps))
+                    (statics(Method::DynamicRelaxation(method), false), Some(s.steps))
                 }
                 model::Solver::ForwardEuler(_) => (Solver::ForwardEuler(ForwardEuler), None),
             };
@@ -483,20 +483,44 @@ fn moves(solver: &model::Solver) -> bool {
     matches!(solver, model::Solver::VelocityVerlet(_) | model::Solver::RungeKutta(_))
 }
 
-fn linear_solver(statics: &model::Statics) -> LinearSolver {
-    let method = match statics.linear {
+fn quasi_static(s: &model::QuasiStatic) -> Statics {
+    let linear = linear_solver(s.linear.unwrap_or_default(), s.preconditioner, s.max_linear);
+    let newton = Newton { tolerance: s.tolerance, max_iterations: s.max_iterations, linear };
+    let breaking = Breaking {
+        control: match s.control {
+            model::Control::Load => Control::Load,
+            model::Control::Equilibrium => Control::Equilibrium,
+        },
+        together: match s.together {
+            model::Together::One => Together::One,
+            model::Together::Share(share) => Together::Share(share),
+        },
+        factored: match s.linear {
+            None => s.preconditioner.is_none(),
+            Some(linear) => linear == model::LinearSolver::Direct,
+        },
+    };
+    Statics { method: Method::Newton(newton), linearised: false, breaking: Some(breaking) }
+}
+
+fn linear_solver(
+    linear: model::LinearSolver,
+    preconditioner: Option<model::Preconditioner>,
+    max_iterations: usize,
+) -> LinearSolver {
+    let method = match linear {
         model::LinearSolver::ConjugateGradients => linear_solver::Method::ConjugateGradients,
         model::LinearSolver::Direct => linear_solver::Method::Direct,
         model::LinearSolver::Bicgstab => linear_solver::Method::Bicgstab,
         model::LinearSolver::Gmres => linear_solver::Method::Gmres,
     };
-    let preconditioner = match statics.preconditioner.unwrap_or_default() {
+    let preconditioner = match preconditioner.unwrap_or_default() {
         model::Preconditioner::Jacobi => Preconditioning::Jacobi,
         model::Preconditioner::BlockJacobi => Preconditioning::BlockJacobi,
         model::Preconditioner::IncompleteFactors => Preconditioning::Incomplete,
         model::Preconditioner::None => Preconditioning::None,
     };
-    LinearSolver { method, preconditioner, max_iterations: statics.max_linear }
+    LinearSolver { method, preconditioner, max_iterations }
 }
 
 /// Reads and builds a case file, or the `case.toml` of a folder.
