@@ -149,13 +149,13 @@ impl Direct {
 }
 
 /// The pattern of Aᵀ by columns, which is that of A by rows.
-fn pattern(a: &Sparse) -> SymbolicSparseColMat<usize> {
+pub(super) fn pattern(a: &Sparse) -> SymbolicSparseColMat<usize> {
     let starts = a.starts().iter().map(|s| *s as usize).collect();
     let columns = a.columns().iter().map(|c| *c as usize).collect();
     SymbolicSparseColMat::new_checked(a.size(), a.size(), starts, None, columns)
 }
 
-fn failed(method: &'static str, cause: impl std::fmt::Display) -> LinearError {
+pub(super) fn failed(method: &'static str, cause: impl std::fmt::Display) -> LinearError {
     LinearError::Factor { method, cause: cause.to_string() }
 }
 

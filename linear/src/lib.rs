@@ -12,6 +12,7 @@
 //! | symmetric, its largest eigenvalue to be known | [`bound_of_largest_eigenvalue()`] |
 
 mod bicgstab;
+mod condensed;
 mod conjugate_gradients;
 mod direct;
 mod gmres;
@@ -28,6 +29,7 @@ pub mod vector;
 mod matrices;
 
 pub use bicgstab::bicgstab;
+pub use condensed::Condensed;
 pub use conjugate_gradients::conjugate_gradients;
 pub use direct::Direct;
 pub use gmres::gmres;

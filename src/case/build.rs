@@ -48,7 +48,6 @@ use crate::physics::failure::CriticalStretch;
 use crate::problem::Problem;
 use crate::simulation::{Model, Simulation, Stepper};
 use crate::solver::Clock;
-use crate::solver::linear_solver::{self, LinearSolver, Preconditioning};
 pub use geometry::available_memory;
 use materials::Values;
 use outputs::{force_on_set, force_through_cut, names, schedule, style, tip_window};
@@ -427,22 +426,6 @@ impl<const D: usize> Builder<'_, D> {
 
 fn moves(solver: &model::Solver) -> bool {
     matches!(solver, model::Solver::VelocityVerlet(_) | model::Solver::RungeKutta(_))
-}
-
-fn linear_solver(statics: &model::Statics) -> LinearSolver {
-    let method = match statics.linear {
-        model::LinearSolver::ConjugateGradients => linear_solver::Method::ConjugateGradients,
-        model::LinearSolver::Direct => linear_solver::Method::Direct,
-        model::LinearSolver::Bicgstab => linear_solver::Method::Bicgstab,
-        model::LinearSolver::Gmres => linear_solver::Method::Gmres,
-    };
-    let preconditioner = match statics.preconditioner.unwrap_or_default() {
-        model::Preconditioner::Jacobi => Preconditioning::Jacobi,
-        model::Preconditioner::BlockJacobi => Preconditioning::BlockJacobi,
-        model::Preconditioner::IncompleteFactors => Preconditioning::Incomplete,
-        model::Preconditioner::None => Preconditioning::None,
-    };
-    LinearSolver { method, preconditioner, max_iterations: statics.max_linear }
 }
 
 /// Reads and builds a case file, or the `case.toml` of a folder.

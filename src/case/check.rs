@@ -11,8 +11,8 @@ use std::collections::BTreeSet;
 
 use super::diagnostics::Diagnostic;
 use super::model::{
-    Axis, Case, Crack, FieldName, Hybrid, LinearSolver, Load, Motion, Output, Region, Scheme, Shape, Solver,
-    SurfaceCorrection,
+    Axis, Case, Control, Crack, FieldName, Hybrid, LinearSolver, Load, Motion, Output, Region, Scheme, Shape, Solver,
+    SurfaceCorrection, Together,
 };
 use super::read::{Located, Source};
 use crate::expression::nearest;
@@ -241,11 +241,20 @@ impl Checker<'_> {
                     let message = "`safety` and `time_step` are both given; only one may be";
                     self.error(&format!("{path}.time_step"), message, "remove one of them");
                 }
-                Solver::Static(s) | Solver::Newton(s) | Solver::QuasiStatic(s)
+                Solver::Static(s) | Solver::Newton(s)
                     if s.linear == LinearSolver::Direct && s.preconditioner.is_some() =>
                 {
-                    let message = "a direct solver has no preconditioner";
-                    self.error(&format!("{path}.preconditioner"), message, "remove it, or choose another `linear`");
+                    self.preconditioned(&path);
+                }
+                Solver::QuasiStatic(s) => {
+                    if s.linear == Some(LinearSolver::Direct) && s.preconditioner.is_some() {
+                        self.preconditioned(&path);
+                    }
+                    if s.control == Control::Equilibrium && matches!(s.together, Together::Share(_)) {
+                        let message =
+                            "with `control = \"equilibrium\"` each bond breaks where it just does: none has an excess";
+                        self.error(&format!("{path}.break"), message, "remove it, or use `control = \"load\"`");
+                    }
                 }
                 _ => {}
             }
@@ -263,6 +272,11 @@ impl Checker<'_> {
             }
             begins = solver.end_time();
         }
+    }
+
+    fn preconditioned(&mut self, path: &str) {
+        let message = "a direct solver has no preconditioner";
+        self.error(&format!("{path}.preconditioner"), message, "remove it, or choose another `linear`");
     }
 
     fn geometry(&mut self, case: &Case) {

@@ -314,6 +314,36 @@ impl Balance {
     }
 }
 
+/// A bond of a body at rest that is a spring of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spring {
+    /// Of its states, one at each end; twice the same where it is seen from one end only, as the bond to an image.
+    pub bits: [usize; 2],
+    /// The slots of its ends; of an image that of its source.
+    pub ends: [u32; 2],
+    /// ξ, m
+    pub xi: [f64; 3],
+    /// Of the components of the displacement of the second end, as the first one sees it.
+    pub signs: [f64; 3],
+    /// w: it holds ½ w s² at the stretch s; J.
+    pub weight: f64,
+    /// s₀, infinite where it never breaks.
+    pub critical: f64,
+}
+
+/// A whole bond, from one end, at some displacements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretched {
+    /// Of its state.
+    pub bit: usize,
+    /// s
+    pub stretch: f64,
+    /// The change of s along some vector.
+    pub rate: f64,
+    /// s₀
+    pub critical: f64,
+}
+
 /// A body at rest, as static solvers see it: in double precision whatever the fields are stored in. Unknowns are the
 /// displacements by slot, component after component; forces are those on a point, N.
 pub trait Tangent {
@@ -337,10 +367,13 @@ pub trait Tangent {
     fn assemble(&mut self, u: &[f64], free: &dyn Fn(usize) -> bool) -> Sparse;
     /// Whether bonds can break.
     fn can_break(&self) -> bool;
-    /// The largest strain of a bond over its critical strain at displacements `u`; 0 where all are below it.
-    fn worst(&mut self, u: &[f64]) -> f64;
-    /// Breaks the bonds that are strained beyond `limit` times their critical strain.
-    fn break_beyond(&mut self, u: &[f64], limit: f64) -> Broken;
+    /// The bonds of the families as springs, broken ones too; None where points feel more than their own bonds.
+    fn springs(&mut self) -> Option<Vec<Spring>>;
+    /// The whole bonds, from each end, for which `keep` holds of their stretch at displacements `u`, its change along `v`, and the
+    /// critical stretch.
+    fn stretched(&mut self, u: &[f64], v: &[f64], keep: &(dyn Fn(f64, f64, f64) -> bool + Sync)) -> Vec<Stretched>;
+    /// Breaks bonds, at displacements `u`, by the numbers of their bits, both of each bond.
+    fn break_bonds(&mut self, u: &[f64], bits: &[usize]) -> Broken;
     /// The bits of the bonds, to be kept and put back when a step fails.
     fn words(&self) -> &[u16];
     fn words_mut(&mut self) -> &mut [u16];

@@ -42,6 +42,8 @@ pub struct Problem {
     stages: Memory,
     /// What the load steps took, of static solvers.
     pub load_steps: Vec<LoadStep>,
+    /// Its crack, as a static solver left it.
+    crack: Option<Box<rest::Crack>>,
     /// Whether a static solver advances it: the body starts without motion, and prescribed values are the solver's to
     /// impose.
     pub is_static: bool,
@@ -62,6 +64,7 @@ impl Problem {
             dissipation: [0.0; 2],
             stages: Memory::default(),
             load_steps: Vec::new(),
+            crack: None,
             is_static: false,
             stable_step: None,
         };
@@ -116,6 +119,7 @@ impl Problem {
     pub fn hand_over(&mut self, solver: &Solver, t: f64) {
         self.catch_up();
         self.is_static = solver.is_static();
+        self.crack = None;
         let before = self.physics.motion();
         if self.is_static {
             self.stop();

@@ -3,6 +3,13 @@
 //! Always in double precision, whatever the fields are stored in. Unknowns are the displacements by slot, component
 //! after component; forces are those on a point, N: force density times volume.
 
+mod solves;
+mod walk;
+mod zone;
+
+use walk::Walk;
+pub(super) use zone::Crack;
+
 use super::Problem;
 use crate::conditions::{Constraint, Term};
 use crate::error::{Error, NumericalStop, Result};
@@ -10,8 +17,9 @@ use crate::execution::Broken;
 use crate::physics::Tangent;
 use crate::solver::Clock;
 use crate::solver::linear::{LinearError, NullSpace, Preconditioner, Sparse, vector};
-use crate::solver::newton::{Equilibrium, NotConverged};
-use crate::solver::statics::{LoadStep, Statics};
+use crate::solver::linear_solver;
+use crate::solver::newton::{Equilibrium, Newton, NotConverged};
+use crate::solver::statics::{Breaking, LoadStep, Method, Statics};
 
 /// A body that a static solver brings to rest.
 struct StaticSystem<'a> {
@@ -91,13 +99,12 @@ impl<'a> StaticSystem<'a> {
     }
 
     /// What a failed step changes.
-    fn saved(&self) -> (Vec<f64>, Vec<u16>, f64) {
-        (self.displacement.clone(), self.body.words().to_vec(), self.time)
+    fn saved(&self) -> (Vec<f64>, f64) {
+        (self.displacement.clone(), self.time)
     }
 
-    fn restore(&mut self, (displacement, words, time): (Vec<f64>, Vec<u16>, f64)) {
+    fn restore(&mut self, (displacement, time): (Vec<f64>, f64)) {
         self.displacement = displacement;
-        self.body.words_mut().copy_from_slice(&words);
         self.time = time;
     }
 
@@ -231,34 +238,16 @@ impl Problem {
         let (start, began) = (clock.time(), *clock);
         clock.step += 1;
         let end = clock.time();
-        let Problem { physics, constraints, terms, .. } = self;
+        let Problem { physics, constraints, terms, crack, .. } = self;
         let body = physics.tangent().expect("checks have refused static solvers of what cannot rest");
         let mut rest = StaticSystem::new(body, constraints, terms, statics.linearised);
-        let breaking = statics.breaking && rest.body.can_break();
-        rest.time = start;
-        rest.pose(start);
-        let (mut books, mut step, mut failed) = (Books::new(&mut rest), end - start, None);
         let mut log = LoadStep { step: clock.step, ..LoadStep::default() };
-        while rest.time < end && failed.is_none() {
-            let next = if rest.time + 1.001 * step < end { rest.time + step } else { end };
-            let (saved, before) = (rest.saved(), books.clone());
-            let divisible = 0.5 * (next - rest.time) >= SMALLEST_STEP * (end - start);
-            match books.advance(&mut rest, statics, breaking, next, divisible, &mut log, observe) {
-                Ok(true) => step *= 2.0,
-                Err(unrest) if !divisible || unrest.stays() => {
-                    rest.restore(saved);
-                    books = before;
-                    failed = Some(unrest);
-                }
-                // Too far, or not at all: once more, half as far.
-                Ok(false) | Err(_) => {
-                    rest.restore(saved);
-                    books = before;
-                    step = 0.5 * (next - rest.time);
-                    log.halvings += 1;
-                }
+        let (books, failed) = match (&statics.breaking, &statics.method) {
+            (Some(breaking), Method::Newton(newton)) if rest.body.can_break() => {
+                rest.crack(crack, (newton, breaking), [start, end], &mut log, observe)
             }
-        }
+            _ => rest.advance(statics, [start, end], &mut log, observe),
+        };
         let reached = rest.time;
         rest.react(&books.state);
         let Books { state: at_rest, work, broken } = books;
@@ -291,14 +280,11 @@ impl Problem {
 
 /// Of a load step: smaller ones are not tried.
 const SMALLEST_STEP: f64 = 1.0 / 1024.0;
-/// By how much a load step may strain bonds beyond their critical strain before the first of them breaks: they hold twice
-/// this share of energy too much.
-const EXCESS: f64 = 0.005;
-/// Bonds break together whose excess is more than this share of the largest.
-const WORST: f64 = 0.5;
+/// Unknowns up to which a factor is made where nobody has asked for one, in 1D and 2D.
+const MANY: usize = 200_000;
 
 /// The books of a load step.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct Books {
     state: StaticState,
     work: Work,
@@ -310,44 +296,92 @@ impl Books {
         Books { state: rest.resting(), work: Work::default(), broken: Broken::default() }
     }
 
-    /// Brings the body to rest at time `t`, bonds broken until none is overstrained. False when the step is
-    /// `divisible`, and went so far that bonds are strained well beyond where they should have broken.
-    #[allow(clippy::too_many_arguments)] // a step, how it is taken, and who is told of it
+    /// Books the way from the state before to that of now.
+    fn go_on(&mut self, rest: &mut StaticSystem<'_>) {
+        let state = rest.resting();
+        let work = rest.work(&self.state, &state);
+        self.state = state;
+        self.work.external += work.external;
+        self.work.lost += work.lost;
+    }
+}
+
+impl StaticSystem<'_> {
+    /// Brings the body to rest at the end of a load step, by smaller steps where that fails; no bond breaks.
     fn advance(
         &mut self,
-        rest: &mut StaticSystem<'_>,
         statics: &Statics,
-        breaking: bool,
-        t: f64,
-        divisible: bool,
+        [start, end]: [f64; 2],
         log: &mut LoadStep,
         observe: &mut dyn FnMut(usize, f64) -> bool,
-    ) -> Result<bool, NotConverged> {
-        let mut first = true;
-        loop {
-            statics.solve(rest, t, log, observe)?;
-            rest.time = t;
-            let state = rest.resting();
-            let work = rest.work(&self.state, &state);
-            self.state = state;
-            self.work.external += work.external;
-            self.work.lost += work.lost;
-            if !breaking {
-                return Ok(true);
+    ) -> (Books, Option<NotConverged>) {
+        self.time = start;
+        self.pose(start);
+        let (mut books, mut step) = (Books::new(self), end - start);
+        while self.time < end {
+            let next = if self.time + 1.001 * step < end { self.time + step } else { end };
+            let saved = self.saved();
+            match statics.solve(self, next, log, observe) {
+                Ok(()) => {
+                    self.time = next;
+                    books.go_on(self);
+                    step *= 2.0;
+                }
+                Err(unrest) => {
+                    let divisible = 0.5 * (next - self.time) >= SMALLEST_STEP * (end - start);
+                    self.restore(saved);
+                    if !divisible || unrest.stays() {
+                        return (books, Some(unrest));
+                    }
+                    step = 0.5 * (next - self.time);
+                    log.halvings += 1;
+                }
             }
-            let worst = rest.body.worst(&rest.displacement);
-            if worst <= 1.0 {
-                return Ok(true);
-            }
-            if first && divisible && worst > 1.0 + EXCESS {
-                return Ok(false);
-            }
-            first = false;
-            let broken = rest.body.break_beyond(&rest.displacement, 1.0 + WORST * (worst - 1.0));
-            self.broken.bonds += broken.bonds;
-            self.broken.energy += broken.energy;
-            self.state = rest.resting();
         }
+        (books, None)
+    }
+
+    /// Brings the body to rest at the end of a load step, and all along the way; bonds break.
+    fn crack(
+        &mut self,
+        crack: &mut Option<Box<Crack>>,
+        (newton, breaking): (&Newton, &Breaking),
+        [start, end]: [f64; 2],
+        log: &mut LoadStep,
+        observe: &mut dyn FnMut(usize, f64) -> bool,
+    ) -> (Books, Option<NotConverged>) {
+        let mut walk = Walk::begin(self, start, end);
+        let mut books = Books::new(self);
+        walk.keep(self, &books);
+        let mut result = Err(None);
+        let zone = breaking.factored && self.components < 3 && self.floating().basis().is_empty();
+        if zone && (newton.linear.method == linear_solver::Method::Direct || self.displacement.len() <= MANY) {
+            let known = crack.take().and_then(|mut crack| {
+                crack.free(self);
+                crack.fits(self).then_some(crack)
+            });
+            if let Some(mut following) = known.or_else(|| Crack::new(self).map(Box::new)) {
+                following.free(self);
+                let followed = following.follow(self, &mut walk, breaking, newton.tolerance, &mut books, log, observe);
+                result = followed.map_err(Some);
+                *crack = Some(following);
+            }
+        }
+        if let Err(None | Some(NotConverged::Linear(LinearError::Factor { .. }))) = result {
+            // No factor: from where the other way has led to.
+            *crack = None;
+            self.classify(end);
+            walk.restore(self, &mut books);
+            let how = (&newton.linear, breaking);
+            result = solves::follow(self, &mut walk, how, newton.tolerance, &mut books, log, observe).map_err(Some);
+        }
+        let failed = result.err().flatten();
+        if failed.is_some() {
+            *crack = None;
+            walk.restore(self, &mut books);
+        }
+        books.state = self.resting();
+        (books, failed)
     }
 }
 

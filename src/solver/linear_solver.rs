@@ -49,9 +49,16 @@ pub struct Prepared {
     preconditioner: Box<dyn Preconditioner>,
 }
 
+impl Prepared {
+    /// From now on products are those of the tangent as it is, and only the preconditioner is of the one that it was made for.
+    pub fn forget_matrix(&mut self) {
+        self.matrix = None;
+    }
+}
+
 impl LinearSolver {
     /// Whether the tangent is assembled, so that it has to be prepared again when it changes.
-    fn assembles(&self) -> bool {
+    pub fn assembles(&self) -> bool {
         self.method == Method::Direct || self.preconditioner == Preconditioning::Incomplete
     }
 

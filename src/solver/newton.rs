@@ -106,7 +106,7 @@ impl NotConverged {
 }
 
 /// Share of the loads that may be balanced by nothing: rounding of sums over a body leaves less.
-pub(super) const UNBALANCED: f64 = 1e-8;
+pub const UNBALANCED: f64 = 1e-8;
 /// What the linear solver may leave of the imbalance at first; less as Newton's method closes in.
 const FORCING: f64 = 0.1;
 const HALVINGS: usize = 12;

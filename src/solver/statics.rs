@@ -11,8 +11,35 @@ pub struct Statics {
     pub method: Method,
     /// Forces are those of the tangent at u = 0: small displacements.
     pub linearised: bool,
-    /// Overstrained bonds break, the worst first, and the body is brought to rest again until none does.
-    pub breaking: bool,
+    /// How bonds break; None where they do not.
+    pub breaking: Option<Breaking>,
+}
+
+/// How bonds break while a body is brought to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Breaking {
+    pub control: Control,
+    pub together: Together,
+    /// Whether the tangent is factored once for many breaks, where that can be done.
+    pub factored: bool,
+}
+
+/// What the loads do while bonds break.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Control {
+    /// They stay, and rise when no bond is left that breaks.
+    Load,
+    /// They fall, so that each bond breaks where it just does.
+    Equilibrium,
+}
+
+/// Which bonds break before the body is brought to rest again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Together {
+    /// The one that breaks first, with those that are strained alike.
+    One,
+    /// Those, too, whose excess over the critical stretch is more than this share of the largest.
+    Share(f64),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,6 +60,13 @@ pub struct LoadStep {
     pub linear_iterations: usize,
     /// How often it was taken back and divided.
     pub halvings: usize,
+    /// How often bonds broke, one or several alike.
+    pub breaks: usize,
+    /// Times that the tangent was factored for the bonds about a crack.
+    pub factors: usize,
+    /// Before each break, or every so many: time (s), work that the conditions do a second (J/s, of loads and prescribed
+    /// displacements that change in proportion to time), bonds broken in the load step so far.
+    pub path: Vec<[f64; 3]>,
     /// |r| over loads or reactions at the end.
     pub imbalance: f64,
     /// The same before each iteration on the way to the last equilibrium; of long ways every so many only.
@@ -41,6 +75,26 @@ pub struct LoadStep {
 
 /// Numbers of a history that are kept.
 const KEPT: usize = 100;
+/// Of breaks.
+const KEPT_BREAKS: usize = 2000;
+
+impl LoadStep {
+    /// Takes note of a break.
+    pub fn note(&mut self, at: [f64; 3]) {
+        self.breaks += 1;
+        let every = (self.breaks / KEPT_BREAKS + 1).next_power_of_two();
+        if self.path.len() >= KEPT_BREAKS {
+            let mut k = 0;
+            self.path.retain(|_| {
+                k += 1;
+                k % 2 == 1
+            });
+        }
+        if (self.breaks - 1).is_multiple_of(every) {
+            self.path.push(at);
+        }
+    }
+}
 
 impl Statics {
     /// Brings `system` to rest at time `t`, and adds to `log` what it took. `observe` is told the iterations of the

@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 
 use super::super::model;
-use super::{Builder, SAFETY, linear_solver};
+use super::{Builder, SAFETY};
 use crate::error::Result;
 use crate::simulation::SolverStage;
 use crate::solver::dynamic_relaxation::DynamicRelaxation;
+use crate::solver::linear_solver::{self, LinearSolver, Preconditioning};
 use crate::solver::newton::Newton;
-use crate::solver::statics::Method;
+use crate::solver::statics::{Breaking, Control, Method, Together};
 use crate::solver::{ForwardEuler, RungeKutta, Solver, Statics, VelocityVerlet};
 
 /// Largest number of steps: more would take this machine longer than anybody waits.
@@ -40,10 +41,10 @@ impl<const D: usize> Builder<'_, D> {
         let (mut stages, mut first, mut time) = (VecDeque::new(), 0, 0.0);
         for (path, model) in self.case.value.solver.stages() {
             let newton = |s: &model::Statics| {
-                let linear = linear_solver(s);
+                let linear = linear_solver(s.linear, s.preconditioner, s.max_linear);
                 Method::Newton(Newton { tolerance: s.tolerance, max_iterations: s.max_iterations, linear })
             };
-            let statics = |method, linearised, breaking| Solver::Statics(Statics { method, linearised, breaking });
+            let statics = |method, linearised| Solver::Statics(Statics { method, linearised, breaking: None });
             let moving = |s: &model::Explicit| Chosen { safety: s.safety, time_step: s.time_step };
             let (solver, chosen) = match model {
                 model::Solver::VelocityVerlet(s) => {
@@ -53,12 +54,12 @@ impl<const D: usize> Builder<'_, D> {
                 model::Solver::ForwardEuler(s) => {
                     (Solver::ForwardEuler(ForwardEuler), Ok(Chosen { safety: s.safety, time_step: s.time_step }))
                 }
-                model::Solver::Static(s) => (statics(newton(s), true, false), Err(s.steps)),
-                model::Solver::Newton(s) => (statics(newton(s), false, false), Err(s.steps)),
-                model::Solver::QuasiStatic(s) => (statics(newton(s), false, true), Err(s.steps)),
+                model::Solver::Static(s) => (statics(newton(s), true), Err(s.steps)),
+                model::Solver::Newton(s) => (statics(newton(s), false), Err(s.steps)),
+                model::Solver::QuasiStatic(s) => (Solver::Statics(quasi_static(s)), Err(s.steps)),
                 model::Solver::DynamicRelaxation(s) => {
                     let method = DynamicRelaxation { tolerance: s.tolerance, max_iterations: s.max_iterations };
-                    (statics(Method::DynamicRelaxation(method), false, false), Err(s.steps))
+                    (statics(Method::DynamicRelaxation(method), false), Err(s.steps))
                 }
             };
             let end = model.end_time();
@@ -173,6 +174,46 @@ fn whole_steps(length: f64, dt: f64) -> Vec<Steps> {
         _ => [(dt, n), (rest, 1.0)],
     };
     list.into_iter().filter(|(_, n)| *n > 0.0).collect()
+}
+
+fn quasi_static(s: &model::QuasiStatic) -> Statics {
+    let linear = linear_solver(s.linear.unwrap_or_default(), s.preconditioner, s.max_linear);
+    let newton = Newton { tolerance: s.tolerance, max_iterations: s.max_iterations, linear };
+    let breaking = Breaking {
+        control: match s.control {
+            model::Control::Load => Control::Load,
+            model::Control::Equilibrium => Control::Equilibrium,
+        },
+        together: match s.together {
+            model::Together::One => Together::One,
+            model::Together::Share(share) => Together::Share(share),
+        },
+        factored: match s.linear {
+            None => s.preconditioner.is_none(),
+            Some(linear) => linear == model::LinearSolver::Direct,
+        },
+    };
+    Statics { method: Method::Newton(newton), linearised: false, breaking: Some(breaking) }
+}
+
+fn linear_solver(
+    linear: model::LinearSolver,
+    preconditioner: Option<model::Preconditioner>,
+    max_iterations: usize,
+) -> LinearSolver {
+    let method = match linear {
+        model::LinearSolver::ConjugateGradients => linear_solver::Method::ConjugateGradients,
+        model::LinearSolver::Direct => linear_solver::Method::Direct,
+        model::LinearSolver::Bicgstab => linear_solver::Method::Bicgstab,
+        model::LinearSolver::Gmres => linear_solver::Method::Gmres,
+    };
+    let preconditioner = match preconditioner.unwrap_or_default() {
+        model::Preconditioner::Jacobi => Preconditioning::Jacobi,
+        model::Preconditioner::BlockJacobi => Preconditioning::BlockJacobi,
+        model::Preconditioner::IncompleteFactors => Preconditioning::Incomplete,
+        model::Preconditioner::None => Preconditioning::None,
+    };
+    LinearSolver { method, preconditioner, max_iterations }
 }
 
 #[cfg(test)]

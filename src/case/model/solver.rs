@@ -49,7 +49,8 @@ impl Solver {
     pub fn end_time(&self) -> f64 {
         match self {
             Solver::VelocityVerlet(s) | Solver::RungeKutta(s) => s.end_time,
-            Solver::Static(s) | Solver::Newton(s) | Solver::QuasiStatic(s) => s.end_time,
+            Solver::Static(s) | Solver::Newton(s) => s.end_time,
+            Solver::QuasiStatic(s) => s.end_time,
             Solver::DynamicRelaxation(s) => s.end_time,
             Solver::ForwardEuler(s) => s.end_time,
         }
@@ -76,9 +77,8 @@ pub enum Solver {
     Newton(Statics),
     /// The same by motion that dies out: no linear system is solved.
     DynamicRelaxation(Relaxation),
-    /// Newton's method, and overstrained bonds break, the worst first, until none is left; load steps are cut where no
-    /// equilibrium is found.
-    QuasiStatic(Statics),
+    /// Equilibrium of the law as it is, and bonds break one by one where the load has reached what they bear.
+    QuasiStatic(QuasiStatic),
     /// Of diffusion: explicit, first order; one sum over bonds a step.
     ForwardEuler(FirstOrder),
 }
@@ -112,6 +112,67 @@ pub struct Statics {
     #[serde(default = "many_iterations")]
     #[schemars(range(min = 1))]
     pub max_linear: usize,
+}
+
+/// Parameters of cracks that grow at rest.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct QuasiStatic {
+    /// Time at the end of the last load step; 1 s if not given.
+    #[serde(default = "super::one")]
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
+    pub end_time: f64,
+    /// Load steps, of the same length. In each of them what is prescribed changes in proportion to time.
+    #[serde(default = "one_step")]
+    #[schemars(range(min = 1))]
+    pub steps: u64,
+    /// What the loads do while bonds break.
+    #[serde(default)]
+    pub control: Control,
+    /// Which bonds break before the body is brought to rest again.
+    #[serde(default, rename = "break")]
+    pub together: Together,
+    /// At rest when forces out of balance are at most this share of loads or reactions.
+    #[serde(default = "balanced")]
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 0.01))]
+    pub tolerance: f64,
+    /// Iterations of Newton's method from one break to the next.
+    #[serde(default = "newton_iterations")]
+    #[schemars(range(min = 1))]
+    pub max_iterations: usize,
+    /// How linear systems are solved. If not given: in 1D and 2D by factors that many breaks share, as `direct`; where these do
+    /// not fit by `conjugate_gradients`.
+    pub linear: Option<LinearSolver>,
+    /// Of the Krylov methods; `jacobi` if not given.
+    pub preconditioner: Option<Preconditioner>,
+    /// Iterations of the linear solver in each system.
+    #[serde(default = "many_iterations")]
+    #[schemars(range(min = 1))]
+    pub max_linear: usize,
+}
+
+/// What the loads do while bonds break.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Control {
+    /// They stay until no bond breaks any more, then they rise.
+    #[default]
+    Load,
+    /// They fall as far as equilibrium wants, so that each bond breaks where it just does: the snap-back of the load curve is in
+    /// `load_steps` of the report.
+    Equilibrium,
+}
+
+/// Which bonds break before the body is brought to rest again.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Together {
+    /// The one that breaks first, with those that are strained alike.
+    #[default]
+    One,
+    /// Those, too, whose strain beyond the critical one is more than this share of the largest excess: fewer states at rest, and
+    /// bonds break that the first ones would have relieved.
+    Share(#[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))] f64),
 }
 
 /// Solvers of linear systems.

@@ -2,8 +2,6 @@
 //!
 //! f = Σ μ f(ξ, η) β V′; Shojaei et al. 2022, eq. (26). One pass over the bonds, in which those that overstretch break first.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use super::State;
 use super::bond_forces::{BondForce, BondForces};
 use super::breaking::Breaking;
@@ -151,19 +149,25 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
         Some(Exec::blocks(body, weights, states, u, stiffness))
     }
 
-    fn break_beyond(
+    fn has_springs(&self) -> bool {
+        !L::MEMORY
+    }
+
+    fn energy_at(
         &self,
-        on: &mut On<'_, D>,
-        states: &mut BondStates,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &BondStates,
         u: [&[f64]; D],
-        force: [&mut [f64]; D],
-        limit: f64,
-        largest: &AtomicU64,
-    ) -> Broken {
-        let Some(failure) = on.failure else { return Broken::default() };
-        let rule = Overstrained { failure, law: self.law, displacement: u, limit, largest };
-        let (weights, kernel) = (&on.operator.weights, Force(self.law));
-        on.exec.sum_bonds_and_break::<D, D, D, Double>(on.body, weights, states, u, force, &kernel, &rule)
+        slot: usize,
+    ) -> f64 {
+        let energy = |bit: usize, _, mut bond: Bond<D, f64>, eta: [f64; D]| {
+            let strain = self.law.strain(&bond, &eta);
+            bond.memory = self.memory.get(bit).map_or(0.0, |memory| memory.to_f64());
+            bond.memory = self.law.remember(&bond, strain);
+            self.law.energy(&bond, strain)
+        };
+        0.5 * Exec::each_bond(body, weights, states, u, slot, energy).iter().sum::<f64>()
     }
 
     fn bond_forces<'a>(
@@ -210,33 +214,5 @@ impl<const D: usize, L: BondLaw<D>, P: Packs> Material<D, P> for Bonds<L, P> {
 
     fn shares(&self, on: &mut On<'_, D>, scaling: &BondWeighting) -> Shares {
         shares_of_bonds(on, scaling)
-    }
-}
-
-/// Bonds of a body at rest whose strain passes `limit` times the critical one.
-struct Overstrained<'a, const D: usize, L> {
-    failure: &'a CriticalStretch,
-    law: L,
-    displacement: [&'a [f64]; D],
-    limit: f64,
-    /// Bits of the largest strain over the critical one: those of positive numbers ascend with them.
-    largest: &'a AtomicU64,
-}
-
-impl<const D: usize, L: BondLaw<D>> BreakRule<D> for Overstrained<'_, D, L> {
-    fn threshold(&self) -> f64 {
-        self.law.strain_at(self.failure.smallest())
-    }
-
-    fn breaks(&self, here: usize, there: usize, strain: f64) -> bool {
-        let ratio = strain / self.law.strain_at(self.failure.of(here, there));
-        self.largest.fetch_max(ratio.to_bits(), Ordering::Relaxed);
-        ratio > self.limit
-    }
-
-    /// Half of what the bond holds.
-    fn released(&self, bond: &Bond<D, f64>, here: usize, there: usize) -> f64 {
-        let eta = std::array::from_fn(|d| self.displacement[d][there] - self.displacement[d][here]);
-        0.5 * self.law.energy(bond, self.law.strain(bond, &eta))
     }
 }

@@ -10,7 +10,6 @@
 //! damps a wave in proportion to its frequency squared and takes next to nothing from those that are long beside the horizon.
 
 use std::sync::Mutex;
-use std::sync::atomic::AtomicU64;
 
 use super::State;
 use super::bond_forces::BondForces;
@@ -19,7 +18,7 @@ use super::material::{Material, On, Overstretched, RowBoundary};
 use super::surface::Shares;
 use crate::discretization::collocation::{SharedRow, SharedSlope};
 use crate::discretization::{BondWeighting, BondWeights, Regions};
-use crate::execution::{BlockRow, Broken, Exec, Limits, Motion, Packs};
+use crate::execution::{BlockRow, Exec, Limits, Motion, Packs};
 use crate::family::{Body, Bond, BondStates, Families};
 use crate::field::{Number, components, components_mut};
 use crate::parallel;
@@ -371,16 +370,15 @@ impl<const D: usize, P: Packs> Material<D, P> for Hybrid<D, P> {
         self.inner.stiffness(body, weights, states, u)
     }
 
-    fn break_beyond(
+    fn energy_at(
         &self,
-        on: &mut On<'_, D>,
-        states: &mut BondStates,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &BondStates,
         u: [&[f64]; D],
-        force: [&mut [f64]; D],
-        limit: f64,
-        largest: &AtomicU64,
-    ) -> Broken {
-        self.inner.break_beyond(on, states, u, force, limit, largest)
+        slot: usize,
+    ) -> f64 {
+        self.inner.energy_at(body, weights, states, u, slot)
     }
 
     fn bond_forces<'a>(

@@ -306,6 +306,22 @@ impl<const D: usize, L: Stretch<D>, P: Packs> Material<D, P> for LinearSolid<L, 
         diagonal.iter_mut().flat_map(|d| d.iter_mut()).for_each(|d| *d *= self.bound[1]);
     }
 
+    fn energy_at(
+        &self,
+        body: &Body<D>,
+        weights: &BondWeights,
+        states: &BondStates,
+        u: [&[f64]; D],
+        slot: usize,
+    ) -> f64 {
+        let parts = Exec::each_bond(body, weights, states, u, slot, |_, _, bond, eta| {
+            let s = self.law.stretch_at(self.law.strain(&bond, &eta));
+            [bond.weight * bond.length * s, bond.weight * bond.length * s * s]
+        });
+        let [sum, squares] = parts.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        0.5 * (self.stiffness[slot] * squares + self.bulk[slot] * sum * sum)
+    }
+
     /// T⟨ξ⟩ V′ = c ω̃ (p + q s) M β V′ with p and q of the point itself.
     fn bond_forces<'a>(
         &'a self,

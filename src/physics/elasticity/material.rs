@@ -1,7 +1,6 @@
 //! What is inside an elastic body, behind one face: bonds, a state-based solid, the hybrid scheme over either.
 
 use std::sync::Mutex;
-use std::sync::atomic::AtomicU64;
 
 use super::State;
 use super::bond_forces::BondForces;
@@ -9,7 +8,7 @@ use super::density::Density;
 use super::hybrid::Work;
 use super::surface::Shares;
 use crate::discretization::{BondWeighting, BondWeights, Operator, Regions};
-use crate::execution::{BlockRow, Broken, Exec, Packs};
+use crate::execution::{BlockRow, Exec, Packs};
 use crate::family::{Body, Bond, BondStates};
 use crate::geometry::Images;
 use crate::physics::failure::CriticalStretch;
@@ -90,19 +89,13 @@ pub trait Material<const D: usize, P: Packs>: Send + Sync {
     ) -> Option<Vec<BlockRow<D>>> {
         None
     }
-    /// Breaks bonds whose strain passes `limit` times the critical one at displacements `u`, and notes the bits of the
-    /// largest share of it. `force` is scratch. Nothing where bodies at rest do not break.
-    fn break_beyond(
-        &self,
-        _on: &mut On<'_, D>,
-        _states: &mut BondStates,
-        _u: [&[f64]; D],
-        _force: [&mut [f64]; D],
-        _limit: f64,
-        _largest: &AtomicU64,
-    ) -> Broken {
-        Broken::default()
+    /// Whether each bond is a spring of its own, whose force is c ω̃ β V′ times its stretch.
+    fn has_springs(&self) -> bool {
+        false
     }
+    /// Strain energy density at a slot, J/m³, bond by bond in double precision.
+    fn energy_at(&self, body: &Body<D>, weights: &BondWeights, states: &BondStates, u: [&[f64]; D], slot: usize)
+    -> f64;
     /// The whole bonds of each point and how they pull at displacements `u`.
     fn bond_forces<'a>(
         &'a self,

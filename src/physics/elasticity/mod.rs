@@ -17,6 +17,7 @@ pub mod linear_solid;
 pub mod material;
 pub mod moduli;
 mod resultants;
+mod springs;
 mod stress;
 mod stretched;
 pub mod surface;

@@ -1,12 +1,10 @@
 //! An elastic body at rest: forces in newtons and their tangent, in double precision whatever the fields are stored in.
 
-use std::sync::atomic::AtomicU64;
-
 use super::Elasticity;
 use crate::execution::{BlockRow, Broken, Packs};
 use crate::field::{Number, components, components_mut};
 use crate::geometry::Images;
-use crate::physics::{Points, Tangent};
+use crate::physics::{Points, Spring, Stretched, Tangent};
 use crate::solver::linear::{BlockJacobi, Layout, LinearError, Preconditioner, Sparse, vector};
 
 /// What preconditioning by blocks keeps of their off-diagonals: the block of a point whose bonds are all in one plane or on
@@ -24,14 +22,6 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
                 }
             });
         }
-    }
-
-    fn break_where(&mut self, u: &[f64], limit: f64, largest: &AtomicU64) -> Broken {
-        let (mut scratch, imaged) = (vec![0.0; u.len()], self.imaged(u));
-        let u = imaged.as_deref().unwrap_or(u);
-        let (material, mut on, state) = self.parts();
-        let (u, force) = (components::<D, _>(u), components_mut::<D, _>(&mut scratch));
-        material.break_beyond(&mut on, &mut state.states, u, force, limit, largest)
     }
 }
 
@@ -165,14 +155,16 @@ impl<const D: usize, P: Packs> Tangent for Elasticity<D, P> {
         self.failure.is_some()
     }
 
-    fn worst(&mut self, u: &[f64]) -> f64 {
-        let largest = AtomicU64::new(0);
-        self.break_where(u, f64::INFINITY, &largest);
-        f64::from_bits(largest.into_inner())
+    fn springs(&mut self) -> Option<Vec<Spring>> {
+        self.all_springs()
     }
 
-    fn break_beyond(&mut self, u: &[f64], limit: f64) -> Broken {
-        self.break_where(u, limit, &AtomicU64::new(0))
+    fn stretched(&mut self, u: &[f64], v: &[f64], keep: &(dyn Fn(f64, f64, f64) -> bool + Sync)) -> Vec<Stretched> {
+        self.bonds_where(u, v, keep)
+    }
+
+    fn break_bonds(&mut self, u: &[f64], bits: &[usize]) -> Broken {
+        self.break_these(u, bits)
     }
 
     fn words(&self) -> &[u16] {
