@@ -259,9 +259,7 @@ impl<const D: usize> Builder<'_, D> {
         if let Some(composition) = &composition {
             elasticity.materials.clone_from(&composition.material);
         }
-        for crack in &cracks {
-            elasticity.cut(crack, tolerance);
-        }
+        elasticity.cut(&cracks, tolerance);
         let (mut constraints, mut terms) = (Vec::new(), self.mirror_forces(&elasticity.body.cloud));
         for (k, condition) in case.conditions.iter().enumerate() {
             let Elasticity { body, state, .. } = &mut elasticity;

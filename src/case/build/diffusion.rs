@@ -63,9 +63,7 @@ impl<const D: usize> Builder<'_, D> {
             }
         };
         let mut diffusing = Diffusing::new(body, diffusion);
-        for crack in &cracks {
-            diffusing.cut(crack, tolerance);
-        }
+        diffusing.cut(&cracks, tolerance);
         let (constraints, terms) = self.what_acts(&mut diffusing, shape.as_ref())?;
         let facts = BodySummary {
             dimension: D,
