@@ -1,5 +1,6 @@
 //! From a checked case to a simulation: the only place where dimension and law become types.
 
+mod cloud;
 mod conditions;
 mod diffusion;
 mod geometry;
@@ -259,6 +260,7 @@ impl<const D: usize> Builder<'_, D> {
         if let Some(composition) = &composition {
             elasticity.materials.clone_from(&composition.material);
         }
+        self.neighbours(&elasticity.body)?;
         elasticity.cut(&cracks, tolerance);
         let (mut constraints, mut terms) = (Vec::new(), self.mirror_forces(&elasticity.body.cloud));
         for (k, condition) in case.conditions.iter().enumerate() {

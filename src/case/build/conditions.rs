@@ -100,19 +100,18 @@ impl<const D: usize> Builder<'_, D> {
         match load {
             model::Load::BodyForce { component, value } => push(*component, value, Scale::Same(1.0)),
             model::Load::Source { value } => push(0, value, Scale::Same(1.0)),
-            model::Load::Flux { value, thickness } => {
-                push(0, value, Scale::Same(1.0 / thickness.unwrap_or(cloud.spacing)))
-            }
+            model::Load::Flux { value, thickness } => push(0, value, layer(*thickness, cloud, slots)),
             model::Load::Traction { component, value, thickness } => {
-                push(*component, value, Scale::Same(1.0 / thickness.unwrap_or(cloud.spacing)))
+                push(*component, value, layer(*thickness, cloud, slots))
             }
             model::Load::Pressure { value, thickness } => {
-                let thickness = thickness.unwrap_or(cloud.spacing);
+                let width = |slot: u32| thickness.unwrap_or_else(|| cloud.size(slot as usize));
                 let Some(shape) = shape else { return Ok(()) };
                 let normals: Vec<Vector<D>> =
                     slots.iter().map(|&slot| shape.normal(&cloud.position(slot as usize))).collect();
                 for d in 0..D {
-                    let scale = Scale::ByPoint(normals.iter().map(|n| -n[d] / thickness).collect());
+                    let normals = normals.iter().zip(slots.iter());
+                    let scale = Scale::ByPoint(normals.map(|(n, &slot)| -n[d] / width(slot)).collect());
                     push(d, value, scale)?;
                 }
                 Ok(())
@@ -144,6 +143,15 @@ impl<const D: usize> Builder<'_, D> {
         CriticalStretch::new(cloud, stretch(energy, failure.stretch), &rules, &failure.no_fail)
             .map(Some)
             .map_err(|e| self.refuse(path, format!("failure rules: {e}"), ""))
+    }
+}
+
+/// What makes a load per area one per volume: 1/thickness, or if none is given one over the side of each point's cell, 1/m.
+fn layer<const D: usize>(thickness: Option<f64>, cloud: &Cloud<D>, slots: &[u32]) -> Scale {
+    match thickness {
+        Some(thickness) => Scale::Same(1.0 / thickness),
+        None if cloud.is_uniform() => Scale::Same(1.0 / cloud.spacing),
+        None => Scale::ByPoint(slots.iter().map(|&slot| 1.0 / cloud.size(slot as usize)).collect()),
     }
 }
 

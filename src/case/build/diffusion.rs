@@ -63,6 +63,7 @@ impl<const D: usize> Builder<'_, D> {
             }
         };
         let mut diffusing = Diffusing::new(body, diffusion);
+        self.neighbours(&diffusing.body)?;
         diffusing.cut(&cracks, tolerance);
         let (constraints, terms) = self.what_acts(&mut diffusing, shape.as_ref())?;
         let facts = BodySummary {
