@@ -1,5 +1,6 @@
 //! From a checked case to a simulation: the only place where dimension and law become types.
 
+mod cloud;
 mod conditions;
 mod diffusion;
 mod geometry;
@@ -262,9 +263,10 @@ impl<const D: usize> Builder<'_, D> {
         if let Some(composition) = &composition {
             elasticity.materials.clone_from(&composition.material);
         }
-        let cut: Vec<u64> = cracks.iter().map(|crack| elasticity.cut(crack, tolerance)).collect();
+        self.neighbours(&elasticity.body)?;
+        let cut = elasticity.cut(&cracks, tolerance);
         self.remark_size(&elasticity.body);
-        self.remark_cracks(&elasticity.body, &cracks, &cut, tolerance);
+        self.remark_cracks(&elasticity.body, &cracks, cut, tolerance);
         self.remark_parts(&elasticity.body, &elasticity.state.states);
         let (mut constraints, mut terms) = (Vec::new(), self.mirror_forces(&elasticity.body.cloud));
         for (k, condition) in case.conditions.iter().enumerate() {

@@ -140,7 +140,16 @@ impl BondWeighting {
         // Padding stands behind the bonds of a point, so that these are numbered one by one.
         for (k, (bit, j)) in body.bonds_of(point).enumerate() {
             let xi = body.xi(bit, point, j);
-            each(k, j, &xi, self.bond(rule, end(point), end(j), &xi));
+            let (here, there) = (end(point), end(j));
+            let values = if self.rule == PartialVolume::None && here.horizon == there.horizon {
+                // Whole cells, and the family says which.
+                let scale = (self.horizon / here.horizon).powi(D as i32 + 1);
+                let influence = self.influence.quadrature_value(norm(&xi) / here.horizon);
+                [1.0, self.strength * scale * influence]
+            } else {
+                self.bond(rule, here, there, &xi)
+            };
+            each(k, j, &xi, values);
         }
     }
 

@@ -196,7 +196,7 @@ mod tests {
         let square = Shape::Box { low: [0.0; 2], high: [20.0; 2] };
         let body = Body::new(Cloud::lattice(&square, 1.0, 3), 3.0, 3.0..3.0 * (1.0 + 1e-9), |_| true);
         let mut states = BondStates::whole(&body);
-        states.cut(&body, &Crack::Polyline(vec![[-1.0, 10.0], [8.0, 10.0]]), 1e-9);
+        states.cut(&body, &[Crack::Polyline(vec![[-1.0, 10.0], [8.0, 10.0]])], 1e-9);
         (body, states)
     }
 

@@ -7,6 +7,7 @@ pub mod hybrid;
 pub mod influence;
 pub mod moments;
 pub mod quadrature;
+pub mod rim;
 pub mod standard;
 pub mod surface;
 pub mod volume;

@@ -9,9 +9,11 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Heterogeneity, Influence, PartialVolume};
-use crate::family::{Body, CloudFamilies, Families, GROUP, Offset};
+use super::rim::moved_edge;
+use super::{BondWeighting, Heterogeneity, Influence, PartialVolume};
+use crate::family::{Body, CloudFamilies, Families, GROUP, Grading, Offset, Rule, Update};
 use crate::field::{Vector, difference, norm};
+use crate::geometry::Arrangement;
 use crate::geometry::lattice::BLOCK;
 
 /// The weights of one law on one body.
@@ -75,10 +77,38 @@ enum Fractions {
     Weights(Arc<[f64]>),
 }
 
-/// A body for the standard scheme: families that hold every x′ whose cell reaches into the horizon of x.
+/// A body for the standard scheme: families that hold every x′ whose cell reaches into the horizon of x. In a cloud of cells of
+/// several sizes each has its own, and a bond is there if it is for either end.
 pub fn body<const D: usize>(cloud: crate::geometry::Cloud<D>, horizon: f64, rule: PartialVolume) -> Body<D> {
     let spacing = cloud.spacing;
-    Body::new(cloud, horizon, rule.rim::<D>(spacing, horizon), |xi| rule.touches(xi, spacing, horizon))
+    let Arrangement::Scattered { positions, .. } = &cloud.arrangement else {
+        return Body::new(cloud, horizon, rule.rim::<D>(spacing, horizon), |xi| rule.touches(xi, spacing, horizon));
+    };
+    let closed = rule == PartialVolume::None;
+    let edge = rule.edge::<D>(spacing, horizon);
+    if cloud.is_uniform() {
+        let reach = rule.reach::<D>(spacing, horizon);
+        let beyond = |_: usize, _: usize, xi: &Vector<D>| rule.beyond(xi, spacing, horizon);
+        return match moved_edge(positions, spacing, reach, &beyond, edge, closed) {
+            None => Body::new(cloud, horizon, rule.rim::<D>(spacing, horizon), |xi| rule.touches(xi, spacing, horizon)),
+            Some(edge) => {
+                let rim = 0.0..reach + edge.max(0.0);
+                Body::new(cloud, horizon, rim, |xi| rule.beyond(xi, spacing, horizon) <= edge)
+            }
+        };
+    }
+    // Each point by its own cell, seen alike from both ends.
+    let sizes: Vec<f64> = (0..cloud.n_slots()).map(|slot| cloud.size(slot)).collect();
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let reach = rule.reach::<D>(largest, horizon);
+    let beyond =
+        |i: usize, j: usize, xi: &Vector<D>| rule.beyond(xi, sizes[i], horizon).min(rule.beyond(xi, sizes[j], horizon));
+    let edge = moved_edge(positions, spacing, reach, &beyond, edge, closed).unwrap_or(edge);
+    let rim = 0.0..reach + edge.max(0.0);
+    let mut body = Body::seeing(cloud, horizon, rim, &|i, j, xi| beyond(i, j, xi) <= edge);
+    let horizons = vec![horizon; sizes.len()];
+    body.grading = Some(Grading { rule: Rule::Dual, horizons, sizes, shifts: Vec::new() });
+    body
 }
 
 impl Operator {
@@ -90,6 +120,10 @@ impl Operator {
         rule: PartialVolume,
     ) -> Operator {
         let (horizon, spacing) = (body.horizon, body.cloud.spacing);
+        if let (Families::Cloud(_), Some(_)) = (&body.families, &body.grading) {
+            let weighting = BondWeighting { strength, horizon, influence, rule };
+            return weighting.operator(body, &Update::default(), None, None);
+        }
         let mut by_offset = [Vec::new(), Vec::new()];
         let mut fractions = match rule {
             PartialVolume::Ramp => Fractions::Ramp,

@@ -86,6 +86,24 @@ impl PartialVolume {
         }
     }
 
+    /// How far a cell at ξ lies beyond the edge of the rule, m: about 0 it is on it.
+    pub fn beyond<const D: usize>(&self, xi: &[f64; D], spacing: f64, horizon: f64) -> f64 {
+        match self {
+            PartialVolume::None => norm(sorted(xi)) - horizon,
+            PartialVolume::Ramp => norm(sorted(xi)) - (horizon + 0.5 * spacing),
+            PartialVolume::Exact => nearest(sorted(xi), spacing) - horizon,
+        }
+    }
+
+    /// Up to which of these it touches: a cell on the edge counts if cells count whole, and has nothing inside if not.
+    pub fn edge<const D: usize>(&self, spacing: f64, horizon: f64) -> f64 {
+        match self {
+            PartialVolume::None => horizon * RIM_TOLERANCE,
+            PartialVolume::Ramp => -(horizon + 0.5 * spacing) * RIM_TOLERANCE,
+            PartialVolume::Exact => -horizon * RIM_TOLERANCE,
+        }
+    }
+
     /// β where it follows from |ξ| alone; else None.
     pub fn radial(&self, length: f64, spacing: f64, horizon: f64) -> Option<f64> {
         match self {

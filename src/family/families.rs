@@ -145,14 +145,21 @@ impl<const D: usize> Body<D> {
             Arrangement::Lattice(lattice) => {
                 Families::Lattice(LatticeFamilies::new(lattice, &cloud.slots, rim, accept))
             }
-            Arrangement::Scattered { positions, volumes } => {
-                let mut families = search::families(positions, rim, &|_, _, xi| accept(xi));
-                families.sites = Sites::new(positions, volumes);
-                families.keep(cloud.n_points());
-                Families::Cloud(families)
-            }
+            Arrangement::Scattered { .. } => return Body::seeing(cloud, horizon, rim, &|_, _, xi| accept(xi)),
         };
         Body { cloud, families, horizon, grading: None }
+    }
+
+    /// The same of a scattered cloud, where `accept` may depend on both points.
+    pub fn seeing(cloud: Cloud<D>, horizon: f64, rim: Range<f64>, accept: &search::Accept<'_, D>) -> Self {
+        let cloud = cloud.scattered_already();
+        let Arrangement::Scattered { positions, volumes } = &cloud.arrangement else {
+            unreachable!("no lattice any more")
+        };
+        let mut families = search::families(positions, rim, accept);
+        families.sites = Sites::new(positions, volumes);
+        families.keep(cloud.n_points());
+        Body { cloud, families: Families::Cloud(families), horizon, grading: None }
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod bond;
 pub mod families;
 pub mod graded;
+pub mod nearest;
 pub mod search;
 pub mod states;
 mod tree;
@@ -12,4 +13,5 @@ pub use families::{
     Body, Class, CloudFamilies, Families, FixedSites, GROUP, LatticeFamilies, Offset, Sites, mirror_sequences,
 };
 pub use graded::{Grading, Rule, Update};
+pub use nearest::nearest;
 pub use states::BondStates;

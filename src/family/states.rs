@@ -7,8 +7,8 @@
 use rayon::prelude::*;
 
 use super::{Body, CloudFamilies, Families, GROUP};
-use crate::geometry::Crack;
 use crate::geometry::lattice::BLOCK;
+use crate::geometry::{Crack, Cracks};
 use crate::parallel;
 
 /// One bit for each directed bond: of a lattice in `words[block * offsets + offset]`, of a cloud in `words[group of bonds]`.
@@ -118,23 +118,42 @@ impl BondStates {
         self.words.iter().flat_map(|w| w.to_le_bytes()).collect()
     }
 
-    /// Breaks every bond that `crack` cuts; returns how many directed bonds it broke. `tolerance` in m: what counts
-    /// as touching (see [`Crack`]).
-    pub fn cut<const D: usize>(&mut self, body: &Body<D>, crack: &Crack<D>, tolerance: f64) -> u64 {
-        let (low, high) = crack.bounds();
+    /// Breaks every bond that cracks or their images cut; returns how many directed bonds it broke. `tolerance` in m: what
+    /// counts as touching (see [`Crack`]).
+    pub fn cut<const D: usize>(&mut self, body: &Body<D>, cracks: &[Crack<D>], tolerance: f64) -> u64 {
+        let mut cracks = cracks.to_vec();
+        if let Some(images) = &body.cloud.images {
+            let beyond: Vec<Crack<D>> = cracks.iter().flat_map(|crack| images.of_crack(crack)).collect();
+            cracks.extend(beyond);
+        }
         let reach = match &body.families {
             Families::Lattice(families) => families.longest(),
             Families::Cloud(_) => 2.0 * body.horizon,
         };
-        let near = body.cloud.select(|x| (0..D).all(|d| x[d] >= low[d] - reach && x[d] <= high[d] + reach));
-        let blade = crack.blade(tolerance);
+        let cracks = Cracks::new(&cracks, tolerance);
         let mut cut = 0;
-        for slot in near.into_iter().map(|slot| slot as usize) {
-            let a = body.cloud.position(slot);
-            for (bit, there) in body.bonds_of(slot) {
-                if self.holds(bit) && blade.cuts(&a, &body.cloud.position(there)) {
-                    self.words[bit / BLOCK] &= !(1 << (bit % BLOCK));
-                    cut += 1;
+        let slots: Vec<usize> = body.cloud.stored(0..body.cloud.n_points()).collect();
+        // Consecutive slots are near each other.
+        for slots in slots.chunks(BLOCK) {
+            let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+            for &slot in slots {
+                let x = body.cloud.position(slot);
+                for d in 0..D {
+                    low[d] = low[d].min(x[d] - reach);
+                    high[d] = high[d].max(x[d] + reach);
+                }
+            }
+            let near = cracks.near(&low, &high);
+            if near.is_empty() {
+                continue;
+            }
+            for &slot in slots {
+                let a = body.cloud.position(slot);
+                for (bit, there) in body.bonds_of(slot) {
+                    if self.holds(bit) && cracks.cut_by(&near, &a, &body.cloud.position(there)) {
+                        self.words[bit / BLOCK] &= !(1 << (bit % BLOCK));
+                        cut += 1;
+                    }
                 }
             }
         }

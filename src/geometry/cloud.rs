@@ -26,6 +26,8 @@ pub struct Cloud<const D: usize> {
     pub slots: Vec<u32>,
     /// Δx, m: the lattice spacing, or the mean of volume^(1/D) of a scattered cloud.
     pub spacing: f64,
+    /// Whether the volumes of a scattered cloud are one, but for the rounding of printed ones.
+    pub same_size: bool,
     pub sets: PointSets,
     /// What points see beyond mirrors and periodic ends; none of these is a point.
     pub images: Option<Images<D>>,
@@ -46,13 +48,21 @@ impl<const D: usize> Cloud<D> {
                 slots.push(lattice.slot(cell) as u32);
             }
         });
-        Cloud { arrangement: Arrangement::Lattice(lattice), slots, spacing, sets: PointSets::default(), images: None }
+        Cloud {
+            arrangement: Arrangement::Lattice(lattice),
+            slots,
+            spacing,
+            same_size: true,
+            sets: PointSets::default(),
+            images: None,
+        }
     }
 
     /// Points anywhere, with their volumes, stored along a Hilbert curve.
     pub fn scattered(positions: Vec<Vector<D>>, volumes: Vec<f64>) -> Self {
         assert_eq!(positions.len(), volumes.len(), "each point has a volume");
         let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
+        let same_size = are_same(&volumes);
         let order = curve::order(&positions);
         let mut slots = vec![0; order.len()];
         for (slot, &point) in order.iter().enumerate() {
@@ -64,6 +74,7 @@ impl<const D: usize> Cloud<D> {
             arrangement: Arrangement::Scattered { positions, volumes },
             slots,
             spacing: mean.powf(1.0 / D as f64),
+            same_size,
             sets: PointSets::default(),
             images: None,
         }
@@ -94,8 +105,9 @@ impl<const D: usize> Cloud<D> {
     pub fn along_curve(positions: Vec<Vector<D>>, volumes: Vec<f64>) -> Self {
         let slots = (0..positions.len() as u32).collect();
         let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
+        let (spacing, same_size) = (mean.powf(1.0 / D as f64), are_same(&volumes));
         let arrangement = Arrangement::Scattered { positions, volumes };
-        Cloud { arrangement, slots, spacing: mean.powf(1.0 / D as f64), sets: PointSets::default(), images: None }
+        Cloud { arrangement, slots, spacing, same_size, sets: PointSets::default(), images: None }
     }
 
     pub fn n_points(&self) -> usize {
@@ -128,6 +140,19 @@ impl<const D: usize> Cloud<D> {
         }
     }
 
+    /// Side of the cell of the point in `slot`, m: the spacing, or where volumes differ the root of its own.
+    pub fn size(&self, slot: usize) -> f64 {
+        if self.is_uniform() { self.spacing } else { self.volume(slot).powf(1.0 / D as f64) }
+    }
+
+    /// Whether all cells are of one size, but for the rounding of printed volumes.
+    pub fn is_uniform(&self) -> bool {
+        match &self.arrangement {
+            Arrangement::Lattice(_) => true,
+            Arrangement::Scattered { .. } => self.same_size,
+        }
+    }
+
     /// Lowest and highest coordinates of all points, m.
     pub fn bounds(&self) -> (Vector<D>, Vector<D>) {
         let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
@@ -150,10 +175,7 @@ impl<const D: usize> Cloud<D> {
 
     /// Length below which things touch the point in `slot`, m: [`TIE`] of the side of its cell.
     pub fn tie(&self, slot: usize) -> f64 {
-        match &self.arrangement {
-            Arrangement::Lattice(lattice) => TIE * lattice.spacing,
-            Arrangement::Scattered { volumes, .. } => TIE * volumes[slot].powf(1.0 / D as f64),
-        }
+        TIE * self.size(slot)
     }
 
     /// Slots of the points for which `inside` holds, ascending.
@@ -173,6 +195,12 @@ impl<const D: usize> Cloud<D> {
         slots.sort_unstable();
         slots
     }
+}
+
+/// Whether volumes are one, but for the rounding of six printed digits.
+fn are_same(volumes: &[f64]) -> bool {
+    let (low, high) = volumes.iter().fold((f64::INFINITY, 0.0), |(low, high), v| (v.min(low), v.max(high)));
+    high <= low * (1.0 + 1e-5)
 }
 
 /// Lower corner (m) and number of the cells of the box that [`Cloud::lattice`] fills.

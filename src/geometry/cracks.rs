@@ -26,8 +26,8 @@
 //! Cracks may start outside the body, and should where they open at its surface: then no bond meets
 //! their end. Bodies do not know of cracks, and cracks not of bodies.
 //!
-//! Absent on purpose: curved and faceted surfaces in 3D. Of two polygons that share an edge, both
-//! keep a bond through that edge, so let polygons overlap where the crack continues.
+//! All of this is said of one piece by itself. What pieces do that meet, such as the facets of a
+//! surface, is in [`joints`](super::joints).
 
 use super::polygon::{
     bounds_of, check_polygon, closest_on_segment, dimension, distance, doubles_back, edges, finite, norm, orientation,
@@ -36,6 +36,7 @@ use super::polygon::{
 use crate::field::Vector;
 use robust::{Coord3D, orient3d};
 use std::array::from_fn;
+use std::borrow::Cow;
 
 /// A crack in `D` dimensions; lengths in metres. See the [module](self) for its two sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,7 +103,19 @@ impl<const D: usize> Crack<D> {
             Crack::Polygon(vertices) => Some(Plane::through(vertices)),
             _ => None,
         };
-        Blade { crack: self, plane, low, high, tolerance }
+        Blade { crack: Cow::Borrowed(self), plane, low, high, tolerance }
+    }
+
+    /// The same crack with its two sides exchanged.
+    pub(super) fn turned(&self) -> Self {
+        let mut turned = self.clone();
+        match &mut turned {
+            Crack::Point(_) => {}
+            Crack::Polyline(vertices) => vertices.reverse(),
+            Crack::Polygon(vertices) => vertices.reverse(),
+            Crack::Disc { normal, .. } => *normal = normal.map(|n| -n),
+        }
+        turned
     }
 
     /// Checks sizes, coordinates and whether the crack exists in `D` dimensions.
@@ -160,26 +173,39 @@ impl<const D: usize> Crack<D> {
 
 /// A crack made ready to be asked about many bonds.
 pub struct Blade<'a, const D: usize> {
-    crack: &'a Crack<D>,
+    pub(super) crack: Cow<'a, Crack<D>>,
     /// Of a polygon.
-    plane: Option<Plane>,
+    pub(super) plane: Option<Plane>,
     /// A box that holds the crack: bonds beside it are not cut.
-    low: Vector<D>,
-    high: Vector<D>,
-    tolerance: f64,
+    pub(super) low: Vector<D>,
+    pub(super) high: Vector<D>,
+    pub(super) tolerance: f64,
 }
 
 impl<const D: usize> Blade<'_, D> {
+    /// Whether both ends of a bond lie `margin` or more beyond one side of the box.
+    pub(super) fn beside(&self, a: &Vector<D>, b: &Vector<D>, margin: f64) -> bool {
+        let (low, high) = (&self.low, &self.high);
+        (0..D).any(|d| {
+            (a[d] < low[d] - margin && b[d] < low[d] - margin) || (a[d] > high[d] + margin && b[d] > high[d] + margin)
+        })
+    }
+
+    /// It with a crack of its own.
+    pub(super) fn owned(self) -> Blade<'static, D> {
+        let Blade { crack, plane, low, high, tolerance } = self;
+        Blade { crack: Cow::Owned(crack.into_owned()), plane, low, high, tolerance }
+    }
+
     /// As [`Crack::cuts`].
     pub fn cuts(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
-        let (low, high, tolerance) = (&self.low, &self.high, self.tolerance);
-        let beside = |d: usize| (a[d] < low[d] && b[d] < low[d]) || (a[d] > high[d] && b[d] > high[d]);
-        if (0..D).any(beside) {
+        let tolerance = self.tolerance;
+        if self.beside(a, b, 0.0) {
             return false;
         }
         // One order for both directions: rounded values could depend on it.
         let (a, b) = if b < a { (b, a) } else { (a, b) };
-        match self.crack {
+        match &*self.crack {
             Crack::Point(x) => (a[0] - x >= -tolerance) != (b[0] - x >= -tolerance),
             Crack::Polyline(vertices) => {
                 let bond = [[a[0], a[1]], [b[0], b[1]]];
@@ -222,7 +248,7 @@ fn polyline_cuts(vertices: &[[f64; 2]], bond: [[f64; 2]; 2], tolerance: f64) -> 
 }
 
 /// Whether `x` is left of the line from `p` to `q`, or on it.
-fn left_of_line(p: [f64; 2], q: [f64; 2], x: [f64; 2], tolerance: f64) -> bool {
+pub(super) fn left_of_line(p: [f64; 2], q: [f64; 2], x: [f64; 2], tolerance: f64) -> bool {
     orientation(p, q, x) >= -tolerance * distance(&p, &q)
 }
 
@@ -252,7 +278,7 @@ fn polygon_cuts(vertices: &[[f64; 3]], plane: &Plane, bond: [[f64; 3]; 2], toler
 
 /// Where a bond passes from one side of a plane to the other, with the heights of its ends above
 /// the plane. Ends on the plane belong to the positive side.
-fn crossing(bond: [[f64; 3]; 2], heights: [f64; 2], tolerance: f64) -> Option<[f64; 3]> {
+pub(super) fn crossing(bond: [[f64; 3]; 2], heights: [f64; 2], tolerance: f64) -> Option<[f64; 3]> {
     let [above_a, above_b] = heights.map(|height| height >= -tolerance);
     if above_a == above_b {
         return None;
@@ -264,9 +290,9 @@ fn crossing(bond: [[f64; 3]; 2], heights: [f64; 2], tolerance: f64) -> Option<[f
 }
 
 /// Plane of a polygon, through three of its vertices that span it well.
-struct Plane {
+pub(super) struct Plane {
     corners: [[f64; 3]; 3],
-    normal: [f64; 3],
+    pub(super) normal: [f64; 3],
 }
 
 impl Plane {
@@ -287,7 +313,7 @@ impl Plane {
     }
 
     /// Distance from the plane, positive on the positive side; the sign is exact.
-    fn height(&self, x: [f64; 3]) -> f64 {
+    pub(super) fn height(&self, x: [f64; 3]) -> f64 {
         let coord = |p: [f64; 3]| Coord3D { x: p[0], y: p[1], z: p[2] };
         let [p, q, r] = self.corners.map(coord);
         // `orient3d` is positive below the plane.
@@ -295,7 +321,7 @@ impl Plane {
     }
 
     /// Coordinates without the one in which the plane faces most.
-    fn flatten(&self, x: [f64; 3]) -> [f64; 2] {
+    pub(super) fn flatten(&self, x: [f64; 3]) -> [f64; 2] {
         let [along_x, along_y, along_z] = self.normal.map(f64::abs);
         if along_z >= along_x && along_z >= along_y {
             [x[0], x[1]]
@@ -361,15 +387,15 @@ fn area_vector(vertices: &[[f64; 3]]) -> [f64; 3] {
     })
 }
 
-fn difference(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+pub(super) fn difference(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     from_fn(|k| a[k] - b[k])
 }
 
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+pub(super) fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+pub(super) fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

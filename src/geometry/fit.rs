@@ -188,7 +188,7 @@ mod tests {
     use crate::geometry::Cloud;
 
     fn points<const D: usize>(cloud: &Cloud<D>) -> (Vec<Vector<D>>, Vec<f64>) {
-        cloud.slots.iter().map(|&s| (cloud.position(s as usize), cloud.tie(s as usize) / TIE)).unzip()
+        cloud.slots.iter().map(|&s| (cloud.position(s as usize), cloud.size(s as usize))).unzip()
     }
 
     /// Σ φ = 1 and Σ φ x = place, at each piece of the surface.

@@ -385,7 +385,7 @@ prescribe = { concentration = { value = "x + t" } }
     let body = standard::body(cloud, horizon, PartialVolume::Ramp);
     let diffusion = Diffusion::standard(&body, &flux, PartialVolume::Ramp).calibrated(&body, 0.5);
     let mut body = Diffusing::new(body, diffusion);
-    body.cut(&Crack::Polyline(vec![[-0.2, -0.3], [0.1, 0.2]]), 1e-9 * 0.05);
+    body.cut(&[Crack::Polyline(vec![[-0.2, -0.3], [0.1, 0.2]])], 1e-9 * 0.05);
     let set = |inside: fn(&[f64; 2]) -> bool| -> Arc<[u32]> { body.body.cloud.select(inside).into() };
     let [all, held, face] = [set(|_| true), set(|x| x[1] > 0.35), set(|x| x[0] < -0.45)];
     let profile = |formula: &str, slots: &Arc<[u32]>| {

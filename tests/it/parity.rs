@@ -63,7 +63,7 @@ fn evaluated<const D: usize>(body: &Body<D>, physics: &Held<D>, crack: Option<&C
         }
     }
     if let Some(crack) = crack {
-        state.states.cut(body, crack, 1e-9 * SPACING);
+        state.states.cut(body, std::slice::from_ref(crack), 1e-9 * SPACING);
     }
     physics.evolve(&mut state, 0.0);
     state

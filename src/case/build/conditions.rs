@@ -114,8 +114,7 @@ impl<const D: usize> Builder<'_, D> {
                     self.on_pieces(k, value, cloud, shape, &pieces, &inward, terms)?;
                 }
                 None => {
-                    let thickness = thickness.unwrap_or(cloud.spacing);
-                    let Some(shape) = shape else { return Ok(()) };
+                    let Some((thickness, shape)) = thickness.zip(shape) else { return Ok(()) };
                     let normals: Vec<Vector<D>> =
                         slots.iter().map(|&slot| shape.normal(&cloud.position(slot as usize))).collect();
                     for d in 0..D {
@@ -169,16 +168,10 @@ impl<const D: usize> Builder<'_, D> {
             return Ok(Some(pieces.iter().map(|piece| piece.area).sum()));
         }
         let (thickness, area) = self.case.value.conditions[k].load.as_ref().map_or((None, None), model::Load::layer);
-        let scale = match (thickness, area) {
-            (Some(thickness), _) => Scale::Same(1.0 / thickness),
-            (None, Some(area)) => {
-                Scale::Same(area / slots.iter().map(|&slot| cloud.volume(slot as usize)).sum::<f64>())
-            }
-            // One row of cells, each as thick as it is itself.
-            (None, None) => {
-                let side = |slot: &u32| cloud.volume(*slot as usize).powf(1.0 / D as f64);
-                Scale::ByPoint(slots.iter().map(|slot| 1.0 / side(slot)).collect())
-            }
+        let scale = match area {
+            Some(area) => Scale::Same(area / slots.iter().map(|&slot| cloud.volume(slot as usize)).sum::<f64>()),
+            // Without a thickness, one row of cells, each as thick as it is itself.
+            None => layer(thickness, cloud, slots),
         };
         self.in_volume(k, component, value, scale, cloud, slots, terms)?;
         Ok(area)
@@ -208,6 +201,15 @@ impl<const D: usize> Builder<'_, D> {
         CriticalStretch::new(cloud, stretch(energy, failure.stretch), &rules, &failure.no_fail)
             .map(Some)
             .map_err(|e| self.refuse(path, format!("failure rules: {e}"), ""))
+    }
+}
+
+/// What makes a load per area one per volume: 1/thickness, or if none is given one over the side of each point's cell, 1/m.
+fn layer<const D: usize>(thickness: Option<f64>, cloud: &Cloud<D>, slots: &[u32]) -> Scale {
+    match thickness {
+        Some(thickness) => Scale::Same(1.0 / thickness),
+        None if cloud.is_uniform() => Scale::Same(1.0 / cloud.spacing),
+        None => Scale::ByPoint(slots.iter().map(|&slot| 1.0 / cloud.size(slot as usize)).collect()),
     }
 }
 

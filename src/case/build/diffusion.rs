@@ -63,9 +63,10 @@ impl<const D: usize> Builder<'_, D> {
             }
         };
         let mut diffusing = Diffusing::new(body, diffusion);
-        let cut: Vec<u64> = cracks.iter().map(|crack| diffusing.cut(crack, tolerance)).collect();
+        self.neighbours(&diffusing.body)?;
+        let cut = diffusing.cut(&cracks, tolerance);
         self.remark_size(&diffusing.body);
-        self.remark_cracks(&diffusing.body, &cracks, &cut, tolerance);
+        self.remark_cracks(&diffusing.body, &cracks, cut, tolerance);
         self.remark_parts(&diffusing.body, diffusing.states());
         let (constraints, terms) = self.what_acts(&mut diffusing, shape.as_ref())?;
         let facts = BodySummary {

@@ -107,6 +107,7 @@ impl<const D: usize> Builder<'_, D> {
         }
         let points = import::csv::read::<D>(&path)?;
         let mut cloud = Cloud::scattered(points.positions, points.volumes);
+        self.cells_fit(&cloud)?;
         for (name, members) in points.sets {
             let slots = cloud.slots_of(&members);
             cloud.sets.insert(name, slots);
@@ -213,6 +214,7 @@ impl<const D: usize> Builder<'_, D> {
             let message = format!("the horizon {horizon} m is smaller than the mean spacing {} m", cloud.spacing);
             return Err(self.refuse("discretization.horizon", message, "a ratio of 3 to 5 is usual"));
         }
+        self.cells_are_seen(cloud, horizon);
         let (low, high) = cloud.bounds();
         let smallest = (0..D).map(|d| high[d] - low[d] + cloud.spacing).fold(f64::INFINITY, f64::min);
         if horizon > 0.5 * smallest {

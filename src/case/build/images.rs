@@ -4,7 +4,7 @@ use super::super::model::{self, Parity, Side};
 use super::Builder;
 use super::conditions::rounded;
 use crate::conditions::{MirrorForce, Term};
-use crate::discretization::PartialVolume;
+use crate::discretization::{PartialVolume, rim};
 use crate::error::Result;
 use crate::geometry::cloud::cells_of;
 use crate::geometry::images::layers;
@@ -53,7 +53,12 @@ impl<const D: usize> Builder<'_, D> {
         if (0..D).all(|d| self.imaged_ends(d) == 0) {
             return Ok(cloud);
         }
-        let reach = rule.rim::<D>(cloud.spacing, horizon).end;
+        let largest = cloud.slots.iter().map(|&slot| cloud.size(slot as usize)).fold(0.0, f64::max);
+        let mut reach = rule.rim::<D>(largest, horizon).end;
+        if self.case.value.geometry.points.is_some() {
+            // Printed coordinates may leave a pair on the rim a little beyond it.
+            reach += 2.0 * rim::BLUR * cloud.spacing;
+        }
         let mut ends = [Ends::Free; D];
         for (d, ends) in ends.iter_mut().enumerate() {
             if let Some((k, periodic)) = self.periodic(d) {

@@ -53,8 +53,9 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// Pre-cracks that cut nothing, and points that lie on one. `cut`: bonds that each has cut.
-    pub(super) fn remark_cracks(&self, body: &Body<D>, cracks: &[Crack<D>], cut: &[u64], tolerance: f64) {
-        for (k, (crack, cut)) in cracks.iter().zip(cut).enumerate() {
+    pub(super) fn remark_cracks(&self, body: &Body<D>, cracks: &[Crack<D>], cut: u64, tolerance: f64) {
+        let ends = body.cloud.bounds();
+        for (k, crack) in cracks.iter().enumerate() {
             let path = format!("geometry.cracks[{k}]");
             let (low, high) = crack.bounds();
             // Twice: what is that far off is not even touched.
@@ -62,7 +63,9 @@ impl<const D: usize> Builder<'_, D> {
                 |x: &[f64; D]| (0..D).all(|d| low[d] - 2.0 * tolerance <= x[d] && x[d] <= high[d] + 2.0 * tolerance);
             let all = body.cloud.slots.iter().map(|&slot| body.cloud.position(slot as usize));
             let on: Vec<_> = all.filter(|x| within(x) && crack.holds(x, tolerance)).collect();
-            if *cut == 0 {
+            // One of several may cut nothing that others have not cut; but one that nobody reaches is meant to be elsewhere.
+            let apart = (0..D).any(|d| low[d] > ends.1[d] + body.horizon || high[d] < ends.0[d] - body.horizon);
+            if cut == 0 || apart {
                 let message = "this pre-crack cuts no bond: nothing is changed by it".to_owned();
                 let help = "is it inside the body, at least one spacing long, and in metres or with a unit? A bond through its \
                             end is kept";
@@ -243,9 +246,9 @@ mod tests {
         let whole = body(&block(0.0, 2.0));
         let mut states = BondStates::whole(&whole);
         assert!(points(&whole, &states).is_empty());
-        states.cut(&whole, &Crack::Polyline(vec![[0.5, -1.0], [0.5, 2.0]]), 1e-10);
+        states.cut(&whole, &[Crack::Polyline(vec![[0.5, -1.0], [0.5, 2.0]])], 1e-10);
         assert_eq!(points(&whole, &states), [150, 50]);
-        states.cut(&whole, &Crack::Polyline(vec![[-1.0, 0.3], [3.0, 0.3]]), 1e-10);
+        states.cut(&whole, &[Crack::Polyline(vec![[-1.0, 0.3], [3.0, 0.3]])], 1e-10);
         assert_eq!(points(&whole, &states), [105, 45, 35, 15]);
         // A gap of three cells is as wide as the horizon, and one cell more.
         let apart = body(&Shape::Union(vec![block(0.0, 0.5), block(0.8, 2.0)]));

@@ -39,7 +39,7 @@ impl<const D: usize> Points<D> {
         let margin = AROUND * cloud.spacing;
         let slots = cloud.select(|x| (0..D).all(|d| x[d] >= low[d] - margin && x[d] <= high[d] + margin));
         let positions = slots.iter().map(|&slot| cloud.position(slot as usize)).collect();
-        let sides = slots.iter().map(|&slot| cloud.tie(slot as usize) / TIE).collect();
+        let sides = slots.iter().map(|&slot| cloud.size(slot as usize)).collect();
         Points { slots, positions, sides }
     }
 }
@@ -54,7 +54,7 @@ impl<const D: usize> Builder<'_, D> {
                 let message = "a set of points has this name too";
                 return Err(self.refuse(&path, message, "rename one of them"));
             }
-            let pieces = self.named(name, cloud, shape)?;
+            let pieces = self.pieces_named(name, cloud, shape)?;
             let coefficients = vec![1.0; pieces.len()];
             let (slots, _) = self.loaded(pieces, coefficients, true, shape)?.spread_over(cloud);
             found.push((name.clone(), slots));
@@ -64,7 +64,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// The pieces that a name of `[surfaces]` stands for.
-    fn named(&self, name: &str, cloud: &Cloud<D>, shape: Option<&Shape<D>>) -> Result<Vec<Piece<D>>> {
+    fn pieces_named(&self, name: &str, cloud: &Cloud<D>, shape: Option<&Shape<D>>) -> Result<Vec<Piece<D>>> {
         let path = format!("surfaces.{name}");
         let Some(shape) = shape else {
             let message = "nobody knows where the surface of points from a file is";
@@ -210,7 +210,7 @@ impl<const D: usize> Builder<'_, D> {
         let condition = &self.case.value.conditions[k];
         let on = condition.on.as_deref().unwrap_or_default();
         if self.case.value.surfaces.contains_key(on) {
-            return self.named(on, cloud, shape).map(Some);
+            return self.pieces_named(on, cloud, shape).map(Some);
         }
         let Some(shape) = shape else { return Ok(None) };
         let pieces = self.below(slots, cloud, shape);

@@ -128,6 +128,13 @@ pub fn read<const D: usize>(path: &Path) -> Result<Points<D>> {
     Ok(points)
 }
 
+/// The line of a point in a table that [`read`] has accepted.
+pub fn line_of(path: &Path, point: usize) -> Option<u64> {
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).flexible(true).from_path(path).ok()?;
+    let record = reader.records().nth(point)?.ok()?;
+    record.position().map(csv::Position::line)
+}
+
 /// The first two points that are in one place: their bond would have no length.
 fn twins<const D: usize>(positions: &[Vector<D>]) -> Option<(usize, usize)> {
     let mut order: Vec<usize> = (0..positions.len()).collect();

@@ -41,10 +41,10 @@ impl<const D: usize> Diffusing<D> {
         Diffusing { body, diffusion, concentration, rate, bonds, n_bonds, n_cut: 0, exec: Exec::default() }
     }
 
-    /// Makes a pre-crack an insulator: the bonds that it cuts carry nothing. How many they are, both directions counted;
+    /// Makes pre-cracks insulators: the bonds that they cut carry nothing. How many they are, both directions counted;
     /// `tolerance` in m, what counts as touching. Of the standard scheme: rows of collocation are right for whole balls only.
-    pub fn cut(&mut self, crack: &Crack<D>, tolerance: f64) -> u64 {
-        let cut = self.bonds.cut(&self.body, crack, tolerance);
+    pub fn cut(&mut self, cracks: &[Crack<D>], tolerance: f64) -> u64 {
+        let cut = self.bonds.cut(&self.body, cracks, tolerance);
         self.n_cut += cut;
         cut
     }

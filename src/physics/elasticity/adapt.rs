@@ -17,7 +17,7 @@ use crate::execution::gradients::{gradients, largest};
 use crate::expression::Expression;
 use crate::family::{Body, Bond, BondStates, CloudFamilies, Families, GROUP, Grading, Rule};
 use crate::field::{Number, Vector, components, difference, dot, embed, norm};
-use crate::geometry::Crack;
+use crate::geometry::{Crack, Cracks};
 use crate::parallel;
 use crate::physics::Remap;
 use crate::refinement::{Cells, Origin, Transition, Zones, horizons};
@@ -253,8 +253,7 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
             families: old_families,
             words: self.state.states.words(),
             cells: &old,
-            cracks: &adaptation.cracks,
-            tolerance: adaptation.tolerance,
+            cracks: Cracks::new(&adaptation.cracks, adaptation.tolerance),
         };
         let [damaged, near] = cuts.damaged();
         let fresh = AtomicU64::new(0);
@@ -359,8 +358,7 @@ struct Cuts<'a, const D: usize> {
     families: &'a CloudFamilies,
     words: &'a [u16],
     cells: &'a Cells<D>,
-    cracks: &'a [Crack<D>],
-    tolerance: f64,
+    cracks: Cracks<D>,
 }
 
 impl<const D: usize> Cuts<'_, D> {
@@ -394,8 +392,7 @@ impl<const D: usize> Cuts<'_, D> {
         if let Some(holds) = same.and_then(|[a, b]| self.old(a, b)) {
             return holds;
         }
-        let cut = |a: &Vector<D>, b: &Vector<D>| self.cracks.iter().any(|crack| crack.cuts(a, b, self.tolerance));
-        if cut(a, b) {
+        if self.cracks.cut(a, b) {
             return false;
         }
         if damaged.is_empty() {
@@ -412,7 +409,7 @@ impl<const D: usize> Cuts<'_, D> {
                 && damaged[from]
                 && self.old(from, to) == Some(false)
                 // What a pre-crack broke it breaks itself, where it is and not along the borders of cells.
-                && !cut(&self.body.cloud.position(from), &self.body.cloud.position(to))
+                && !self.cracks.cut(&self.body.cloud.position(from), &self.body.cloud.position(to))
             {
                 return false;
             }
@@ -474,9 +471,7 @@ mod tests {
         let body = scaling.body(cloud, grading);
         let operator = scaling.operator(&body, &Update::default(), None, None);
         let mut problem = Elasticity::new(body, operator, Box::new(Bonds::new(BondBasedLinear)), 1.0, failure);
-        for crack in &cracks {
-            problem.cut(crack, 1e-9 * H);
-        }
+        problem.cut(&cracks, 1e-9 * H);
         problem.adapting(adaptation);
         problem
     }
@@ -571,7 +566,7 @@ mod tests {
         {
             let mut problem = problem::<2>([2.4, 1.0], wanted, "0", Vec::new());
             let surface = Crack::Polyline(vec![[1.2, -1.0], [1.2, 2.0]]);
-            problem.state.states.cut(&problem.body, &surface, 1e-9);
+            problem.state.states.cut(&problem.body, &[surface], 1e-9);
             let side = |x: &Vector<2>| x[0] - 1.2;
             let start = crossing(&problem, side);
             assert!(start[0] == 0 && start[3] == 0 && start[2] > 0);
@@ -593,7 +588,7 @@ mod tests {
         let adaptation = problem.adaptation.as_ref().unwrap();
         let body = adaptation.scaling.body(adaptation.cells.cloud(), adaptation.grading());
         let mut expected = BondStates::whole(&body);
-        expected.cut(&body, &crack, 1e-9 * H);
+        expected.cut(&body, &[crack], 1e-9 * H);
         assert_eq!(problem.state.states, expected);
     }
 }

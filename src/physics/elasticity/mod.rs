@@ -138,12 +138,9 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
     }
 
     /// Breaks the bonds that cross a pre-crack or one of its images; how many, both directions counted. `tolerance`, m: what
-    /// counts as touching.
-    pub fn cut(&mut self, crack: &Crack<D>, tolerance: f64) -> u64 {
-        let mut cut = self.state.states.cut(&self.body, crack, tolerance);
-        for image in self.body.cloud.images.iter().flat_map(|images| images.of_crack(crack)) {
-            cut += self.state.states.cut(&self.body, &image, tolerance);
-        }
+    /// counts as touching. All at once, since pieces that meet are one crack.
+    pub fn cut(&mut self, cracks: &[Crack<D>], tolerance: f64) -> u64 {
+        let cut = self.state.states.cut(&self.body, cracks, tolerance);
         self.n_cut += cut;
         cut
     }

@@ -13,7 +13,7 @@ use super::linear_solid::Moduli;
 use super::material::{Material, On};
 use crate::discretization::{BondWeighting, Correction};
 use crate::execution::Packs;
-use crate::family::{Bond, BondKernel, BondStates};
+use crate::family::{Body, Bond, BondKernel, BondStates};
 use crate::field::Double;
 use crate::lane::Lane;
 
@@ -71,9 +71,13 @@ pub fn correction_by_volume<const D: usize>(on: &mut On<'_, D>, scaling: &BondWe
     let body = on.body;
     let mut shares = vec![0.0; body.cloud.n_slots()];
     bonded_volume(on.exec, body, &on.operator.volumes, &BondStates::whole(body), &mut shares);
-    let mut complete = 0.0;
-    scaling.complete::<D>(body.cloud.spacing, body.horizon, |_, volume| complete += volume);
-    shares.iter_mut().for_each(|share| *share /= complete);
+    let complete = |size, horizon| {
+        let mut sum = 0.0;
+        scaling.complete::<D>(size, horizon, |_, volume| sum += volume);
+        sum
+    };
+    // The volume of a family is that of the horizon, and goes with it.
+    by_cell(body, &complete, &mut |slot, complete| shares[slot] /= complete);
     Correction::Volume(shares)
 }
 
@@ -96,26 +100,27 @@ pub(super) fn shares_of_bonds<const D: usize>(on: &mut On<'_, D>, scaling: &Bond
         scaling.complete::<D>(size, horizon, |bond, _| sum = kernel.add(bond, &[], &[], 0.0, sum));
         sum
     };
-    match &body.grading {
-        None => {
-            let complete = complete(body.cloud.spacing, body.horizon);
-            for (share, complete) in shares.iter_mut().zip(complete) {
-                share.iter_mut().for_each(|share| *share /= complete);
-            }
+    // Micromoduli scale so that the ratio δ/Δx alone matters.
+    by_cell(body, &complete, &mut |slot, complete| {
+        for (share, complete) in shares.iter_mut().zip(complete) {
+            share[slot] /= complete;
         }
-        Some(grading) => {
-            // Micromoduli scale so that the ratio δ/Δx alone matters.
-            let mut known = BTreeMap::new();
-            for (slot, (&size, &horizon)) in grading.sizes.iter().zip(&grading.horizons).enumerate() {
-                let ratio: f64 = horizon / size;
-                let complete = known.entry(ratio.to_bits()).or_insert_with(|| complete(size, horizon));
-                for (share, complete) in shares.iter_mut().zip(complete) {
-                    share[slot] /= *complete;
-                }
-            }
-        }
-    }
+    });
     shares
+}
+
+/// Hands out, for each slot, a sum over the complete family of a point with its cell and its horizon.
+fn by_cell<const D: usize, T: Copy>(body: &Body<D>, complete: &dyn Fn(f64, f64) -> T, each: &mut dyn FnMut(usize, T)) {
+    let Some(grading) = &body.grading else {
+        let complete = complete(body.cloud.spacing, body.horizon);
+        return (0..body.cloud.n_slots()).for_each(|slot| each(slot, complete));
+    };
+    // By the ratio δ/Δx, of clouds of many sizes to a quarter of a percent.
+    let mut known = BTreeMap::new();
+    for (slot, (&size, &horizon)) in grading.sizes.iter().zip(&grading.horizons).enumerate() {
+        let ratio: f64 = 256.0 * (horizon / size).log2();
+        each(slot, *known.entry(ratio.round() as i64).or_insert_with(|| complete(size, horizon)));
+    }
 }
 
 /// [`Shares`] of a body whose points have a weighted volume of their own, from the sums of the energies of bonds. Unit
@@ -127,18 +132,21 @@ pub(super) fn shares_of_solid<const D: usize>(moduli: &Moduli, on: &mut On<'_, D
     let (weights, whole, kernel) = (&on.operator.weights, BondStates::whole(body), Squares);
     let output = squares.each_mut().map(|sum| &mut sum[..]);
     on.exec.sum_bonds::<D, 0, 3, Double>(body, weights, &whole, [], output, &kernel);
-    let (mut energies, mut sums) = ([0.0; 4], [0.0; 3]);
-    scaling.complete::<D>(body.cloud.spacing, body.horizon, |bond, _| {
-        energies = UnitStrain.add(bond, &[], &[], 0.0, energies);
-        sums = kernel.add(bond, &[], &[], 0.0, sums);
-    });
+    let complete = |size, horizon| {
+        let (mut energies, mut sums) = ([0.0; 4], [0.0; 3]);
+        scaling.complete::<D>(size, horizon, |bond, _| {
+            energies = UnitStrain.add(bond, &[], &[], 0.0, energies);
+            sums = kernel.add(bond, &[], &[], 0.0, sums);
+        });
+        let of_axis: [f64; D] = std::array::from_fn(|d| moduli.energy(energies[3], sums[d], energies[d]));
+        of_axis
+    };
     let [axes @ .., moments] = &mut shares;
-    for d in 0..D {
-        let complete = moduli.energy(energies[3], sums[d], energies[d]);
-        for (slot, share) in axes[d].iter_mut().enumerate().filter(|(slot, _)| moments[*slot] > 0.0) {
-            *share = moduli.energy(moments[slot], squares[d][slot], *share) / complete;
+    by_cell(body, &complete, &mut |slot, complete| {
+        for d in (0..D).filter(|_| moments[slot] > 0.0) {
+            axes[d][slot] = moduli.energy(moments[slot], squares[d][slot], axes[d][slot]) / complete[d];
         }
-    }
+    });
     moments.iter_mut().for_each(|moment| *moment = if *moment > 0.0 { 1.0 } else { 0.0 });
     shares
 }
