@@ -261,7 +261,10 @@ fn mistakes() -> Vec<Mistake> {
                     "[refinement]\nlevels = 1\nzones = [{ region = { where = \"x > 0\" }, level = 1 }]\n\n\
                      [discretization]\nprecision = \"single\"\nsurface_correction = \"energy\"",
                 ),
-                ("[solver.velocity_verlet]\nend_time = \"5 us\"\nsafety = 0.8", "[solver.newton]\nend_time = 1"),
+                (
+                    "[solver.velocity_verlet]\nend_time = \"5 us\"\nsafety = 0.8",
+                    "[solver.newton]\nend_time = 1\nlinear = \"direct\"",
+                ),
             ],
         ),
         // Materials.

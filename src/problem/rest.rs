@@ -255,6 +255,7 @@ impl Problem {
         self.ledger.external += work.external;
         self.ledger.damped += work.lost;
         log.time = reached;
+        log.broken = broken.bonds / 2;
         let halvings = log.halvings;
         self.load_steps.push(log);
         match failed {
@@ -367,8 +368,8 @@ impl StaticSystem<'_> {
                 *crack = Some(following);
             }
         }
-        if let Err(None | Some(NotConverged::Linear(LinearError::Factor { .. }))) = result {
-            // No factor: from where the other way has led to.
+        if matches!(&result, Err(unrest) if unrest.as_ref().is_none_or(|unrest| !unrest.stays())) {
+            // No factor, or one that leads nowhere any more: from the last state at rest.
             *crack = None;
             self.classify(end);
             walk.restore(self, &mut books);

@@ -60,6 +60,8 @@ pub struct LoadStep {
     pub linear_iterations: usize,
     /// How often it was taken back and divided.
     pub halvings: usize,
+    /// Bonds that broke.
+    pub broken: u64,
     /// How often bonds broke, one or several alike.
     pub breaks: usize,
     /// Times that the tangent was factored for the bonds about a crack.

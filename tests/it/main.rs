@@ -2,6 +2,7 @@
 
 mod architecture;
 mod common;
+mod cracks_at_rest;
 mod diffusion;
 mod diffusion_cases;
 mod diffusion_mistakes;

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use super::super::model::{Case, CriticalStretch, FailurePair, Law, Plane, Scheme, Solver, SurfaceCorrection};
+use super::super::model::{
+    Case, CriticalStretch, FailurePair, Law, LinearSolver, Plane, Preconditioner, Scheme, Solver, SurfaceCorrection,
+};
 use super::Checker;
 
 impl Checker<'_> {
@@ -113,10 +115,19 @@ impl Checker<'_> {
             }
         }
         for (path, solver) in case.solver.stages() {
-            if matches!(solver, Solver::Static(_) | Solver::Newton(_) | Solver::QuasiStatic(_)) {
-                let message = "this solver needs a tangent, which the state-based law does not give";
-                let help = "use `dynamic_relaxation`, `velocity_verlet` or `runge_kutta`, or a bond-based law";
-                self.error(&path, message, help);
+            let (linear, preconditioner) = match solver {
+                Solver::Static(s) | Solver::Newton(s) => (Some(s.linear), s.preconditioner),
+                Solver::QuasiStatic(s) => (s.linear, s.preconditioner),
+                _ => continue,
+            };
+            let of_a_matrix = "needs the tangent bond by bond, and in the state-based law points feel two horizons";
+            if linear == Some(LinearSolver::Direct) {
+                let help = "use `conjugate_gradients`, or a bond-based law";
+                self.error(&format!("{path}.linear"), format!("`direct` {of_a_matrix}"), help);
+            }
+            if let Some(Preconditioner::BlockJacobi | Preconditioner::IncompleteFactors) = preconditioner {
+                let message = format!("this preconditioner {of_a_matrix}");
+                self.error(&format!("{path}.preconditioner"), message, "use `jacobi` or `none`, or a bond-based law");
             }
         }
     }

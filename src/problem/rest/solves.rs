@@ -115,7 +115,9 @@ fn worst(rest: &mut StaticSystem<'_>, walk: &Walk) -> f64 {
     let largest = AtomicU64::new(0);
     let note = |s: f64, _: f64, critical: f64| {
         // Bits of positive numbers ascend with them.
-        largest.fetch_max((s / critical).max(0.0).to_bits(), Ordering::Relaxed);
+        if s > 0.0 {
+            largest.fetch_max((s / critical).to_bits(), Ordering::Relaxed);
+        }
         false
     };
     rest.body.stretched(&rest.displacement, &walk.velocity, &note);
