@@ -621,3 +621,22 @@ fn odd_things_are_said_and_the_case_is_taken() {
         }
     }
 }
+
+/// What is blamed for an imbalance of energy is something that the run has.
+#[test]
+fn an_imbalance_of_energy_is_blamed_on_what_the_run_has() {
+    let place = Place::new("imbalance");
+    let set = |k: usize, v: f64| format!("conditions.{k}.prescribe.velocity.value={v}");
+    let [up, down] = [set(0, 300.0), set(1, -300.0)];
+    let sets = [&*up, &down, "solver.velocity_verlet.safety=1.0", "output=[]"];
+    let args = sets.iter().flat_map(|set| ["--set", set]);
+    let args: Vec<&str> = ["run", "case.toml", "--out", "results", "--quiet"].into_iter().chain(args).collect();
+    let (code, _, error) = place.call(&args);
+    assert_eq!(code, 0, "{error}");
+    for part in ["energy balance is off", "possible cause: the step is 98 % of the stable one", "bonds that break"] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    for part in ["loads", "damping", "rows", "cells"] {
+        assert!(!error.contains(part), "{part}: {error}");
+    }
+}

@@ -322,13 +322,11 @@ impl Problem {
 
     /// Names of two constraints on the same component of a slot, if there are any.
     pub fn contested(&self) -> Option<[&str; 2]> {
-        self.constraints.iter().enumerate().find_map(|(k, one)| {
-            let (component, slots) = one.on();
-            let shares = |other: &&Box<dyn Constraint>| {
-                let (same, others) = other.on();
-                same == component && slots.iter().any(|slot| others.binary_search(slot).is_ok())
-            };
-            self.constraints[k + 1..].iter().find(shares).map(|other| [one.name(), other.name()])
+        let held: Vec<_> = self.constraints.iter().map(|constraint| (constraint.on(), constraint.name())).collect();
+        held.iter().enumerate().find_map(|(k, ((component, slots), one))| {
+            let mut others = held[k + 1..].iter().filter(|((other, _), _)| other == component);
+            let shared = others.find(|((_, held), _)| slots.iter().any(|slot| held.binary_search(slot).is_ok()));
+            shared.map(|(_, other)| [*one, *other])
         })
     }
 

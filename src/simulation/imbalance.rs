@@ -57,9 +57,8 @@ impl Simulation {
             ));
         }
         if report.broken_bonds.is_some_and(|broken| broken > 0) {
-            causes.push(
-                "bonds that break are stretched beyond their limit by a step: a smaller step, or load steps".into(),
-            );
+            let shorter = if self.solver.is_static() { "shorter load steps" } else { "a smaller step" };
+            causes.push(format!("bonds that break within a step have been stretched beyond their limit: {shorter}"));
         }
         if causes.is_empty() {
             causes.push("loads, prescribed motion or initial values that jump: let them start more gently".into());
