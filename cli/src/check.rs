@@ -17,6 +17,18 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
         say!("points            {}", facts.points);
         say!("bonds (directed)  {}, of which pre-cracks cut {}", facts.bonds, facts.cut_bonds);
         say!("spacing           {:.6e} m", facts.spacing);
+        let unit = ["m", "m^2", "m^3"][facts.dimension.clamp(1, 3) - 1];
+        match facts.shape_volume {
+            Some(shape) => say!(
+                "volume            {:.6e} {unit} of cells, {shape:.6e} {unit} of the shape: {:+.2} %",
+                facts.volume,
+                100.0 * (facts.volume / shape - 1.0)
+            ),
+            None => say!("volume            {:.6e} {unit}", facts.volume),
+        }
+        if let Some(mass) = facts.mass {
+            say!("mass              {mass:.6e} {}", ["kg/m^2", "kg/m", "kg"][facts.dimension.clamp(1, 3) - 1]);
+        }
         say!("horizon           {:.6e} m, ratio {:.4}", facts.horizon, facts.horizon / facts.spacing);
         match &facts.physics {
             PhysicsSummary::Elastic(facts) => elastic(facts),

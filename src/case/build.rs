@@ -3,6 +3,7 @@
 mod cloud;
 mod conditions;
 mod diffusion;
+mod filling;
 mod geometry;
 mod hybrid;
 mod images;
@@ -30,7 +31,7 @@ use crate::error::{Error, Result};
 use crate::execution::{Exec, Packs};
 use crate::family::{Body, Update};
 use crate::field::{Double, Mixed, Single, components_mut};
-use crate::geometry::Arrangement;
+use crate::geometry::{Arrangement, Shape};
 use crate::output::crack_tip::CrackTip;
 use crate::output::frames::Frames;
 use crate::output::history::History;
@@ -306,6 +307,8 @@ impl<const D: usize> Builder<'_, D> {
         }
         let stable_step = elasticity.stable_step().min(finest_step);
         let smallest = elasticity.failure.as_ref().map(CriticalStretch::smallest).filter(|s| s.is_finite());
+        let cloud = &elasticity.body.cloud;
+        let mass = cloud.slots.iter().map(|&slot| elasticity.density.at(slot as usize) * cloud.volume(slot as usize));
         let facts = BodySummary {
             dimension: D,
             points: 0,
@@ -313,6 +316,9 @@ impl<const D: usize> Builder<'_, D> {
             cut_bonds: 0,
             horizon,
             spacing: 0.0,
+            volume: 0.0,
+            shape_volume: shape.as_ref().map(Shape::volume),
+            mass: Some(mass.sum()),
             stable_step,
             physics: PhysicsSummary::Elastic(ElasticSummary {
                 bar_speed,

@@ -8,6 +8,7 @@ pub mod images;
 pub mod joints;
 pub mod lattice;
 mod polygon;
+mod quadrature;
 pub mod sets;
 pub mod shapes;
 pub mod surface;

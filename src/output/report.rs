@@ -26,6 +26,11 @@ pub struct Report {
     /// m
     pub horizon: f64,
     pub spacing: f64,
+    /// Of all cells, and of the shape that they fill (null of points from a file); m³, m² in 2D, m in 1D.
+    pub volume: f64,
+    pub shape_volume: Option<f64>,
+    /// kg; null where nothing has a mass.
+    pub mass: Option<f64>,
     /// Of a body of several materials; else empty.
     pub materials: Vec<MaterialSummary>,
     /// Of the first material: N/m⁶ in 3D, N/m⁵ in 2D, N/m⁴ in 1D. This and all that follows of elasticity is null of other physics.

@@ -90,6 +90,11 @@ pub struct BodySummary {
     /// δ and Δx, m.
     pub horizon: f64,
     pub spacing: f64,
+    /// Of all cells, m³ (m² in 2D, m in 1D), and of the shape that they fill; None of points from a file.
+    pub volume: f64,
+    pub shape_volume: Option<f64>,
+    /// kg (per metre of thickness in 2D, per unit of cross-section in 1D); None where nothing has a mass.
+    pub mass: Option<f64>,
     /// Largest stable step, s.
     pub stable_step: f64,
     pub physics: PhysicsSummary,

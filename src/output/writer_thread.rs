@@ -181,6 +181,9 @@ mod tests {
             cut_bonds: 0,
             horizon: 1.0,
             spacing: 1.0,
+            volume: 1.0,
+            shape_volume: None,
+            mass: None,
             stable_step: 1.0,
             physics: PhysicsSummary::Elastic(ElasticSummary {
                 bar_speed: 1.0,

@@ -27,7 +27,8 @@ impl Model {
     pub fn new(problem: Problem, facts: BodySummary) -> Self {
         let points = problem.points();
         let (dimension, horizon, spacing) = (points.dimension(), points.horizon(), points.spacing());
-        let facts = BodySummary { dimension, horizon, spacing, ..facts };
+        let volume = points.slots().iter().map(|&slot| points.volume(slot as usize)).sum();
+        let facts = BodySummary { dimension, horizon, spacing, volume, ..facts };
         let mut model = Model { problem, facts, points: OnceLock::new(), generation: 0 };
         model.count();
         model

@@ -76,6 +76,9 @@ impl<const D: usize> Builder<'_, D> {
             cut_bonds: 0,
             horizon,
             spacing: 0.0,
+            volume: 0.0,
+            shape_volume: shape.as_ref().map(Shape::volume),
+            mass: None,
             stable_step: diffusing.stable_step(),
             physics: PhysicsSummary::Diffusive(DiffusiveSummary {
                 diffusivity,

@@ -59,19 +59,8 @@ impl<const D: usize> Builder<'_, D> {
                 let message = format!("no cell of side {spacing} m has its centre inside the shape");
                 return Err(self.refuse("geometry.spacing", message, "a smaller spacing fills it"));
             }
-            let (low, high) = shape.bounds();
+            self.warn_of_filling(shape, &cloud);
             let Arrangement::Lattice(lattice) = &cloud.arrangement else { return Ok(cloud) };
-            for d in 0..D {
-                let cells = (high[d] - low[d]) / spacing;
-                let axis = ["x", "y", "z"][d];
-                if matches!(shape, Shape::Box { .. }) && (cells - lattice.counts[d] as f64).abs() > 1e-6 * cells {
-                    log::warn!(
-                        "the spacing does not divide the body along {axis}: {} cells of {spacing} m stand for {} m",
-                        lattice.counts[d],
-                        high[d] - low[d]
-                    );
-                }
-            }
             return Ok(match &geometry.perturb {
                 None => cloud,
                 Some(perturb) => {
