@@ -18,7 +18,7 @@ use clap::{Args, Parser, Subcommand};
 #[command(name = "bondwise", version, arg_required_else_help = true, propagate_version = true)]
 #[command(
     after_help = "Exit codes: 0 done, 1 a verification failed, 2 usage, 3 input refused, 4 stopped on numbers,\n\
-    5 I/O, 6 too large for this machine, 7 no usable checkpoint, 130 interrupted.\n\n\
+    5 I/O, 6 too large for this machine, 130 interrupted.\n\n\
     Example:\n  bondwise new crack_branching\n  bondwise run crack_branching"
 )]
 struct Cli {

@@ -9,6 +9,7 @@ mod hybrid;
 mod images;
 mod materials;
 mod outputs;
+mod overlaps;
 mod remarks;
 mod steps;
 mod surfaces;
@@ -270,6 +271,7 @@ impl<const D: usize> Builder<'_, D> {
         self.remark_cracks(&elasticity.body, &cracks, cut, tolerance);
         self.remark_parts(&elasticity.body, &elasticity.state.states);
         let (mut constraints, mut terms) = (Vec::new(), self.mirror_forces(&elasticity.body.cloud));
+        let owned = self.owned(&elasticity.body.cloud)?;
         for (k, condition) in case.conditions.iter().enumerate() {
             let Elasticity { body, state, .. } = &mut elasticity;
             if let Some(load) = condition.load.as_ref().filter(|load| load.is_placed()) {
@@ -277,7 +279,10 @@ impl<const D: usize> Builder<'_, D> {
                 continue;
             }
             let Some(on) = &condition.on else { continue };
-            let slots = self.slots(on, &body.cloud, &format!("conditions[{k}].on"))?;
+            let slots = match owned.get(&k) {
+                Some(owned) => owned.clone(),
+                None => self.slots(on, &body.cloud, &format!("conditions[{k}].on"))?,
+            };
             if let Some(motion) = &condition.initial {
                 let (flat, component, value) = match motion {
                     Motion::Displacement { component, value } => (&mut state.displacement, *component, value),

@@ -134,6 +134,10 @@ impl Checker<'_> {
                     self.error(&path, message, "give each its own [[conditions]] table");
                 }
             }
+            if condition.overrides && condition.initial.is_none() && condition.prescribe.is_none() {
+                let message = "`override` is for `initial` and `prescribe`: loads on the same points add up";
+                self.error(&format!("{path}.override"), message, "remove it");
+            }
             if condition.initial.is_some() && condition.until.is_some() {
                 let message = "an initial value has no end: `until` belongs to `prescribe` and `load`";
                 self.error(&format!("{path}.until"), message, "remove it");
@@ -547,17 +551,37 @@ impl Checker<'_> {
     fn outputs<'a>(&mut self, case: &'a Case, imported: bool, used: &mut BTreeSet<&'a str>) {
         let mut tables: Vec<(&str, String, usize)> = Vec::new();
         let (mut histories, mut tips) = (0, 0);
+        let (mut frames, mut drawn): (Option<usize>, Vec<(usize, &FieldName, Option<usize>)>) = (None, Vec::new());
         for (k, output) in case.output.iter().enumerate() {
             let path = format!("output[{k}]");
             match output {
-                Output::Vtu(vtu) => self.either(
-                    &format!("{path}.vtu"),
-                    ("every", vtu.every.is_some()),
-                    ("every_steps", vtu.every_steps.is_some()),
-                    "every_steps = 100",
-                ),
+                Output::Vtu(vtu) => {
+                    let path = format!("{path}.vtu");
+                    self.either(
+                        &path,
+                        ("every", vtu.every.is_some()),
+                        ("every_steps", vtu.every_steps.is_some()),
+                        "every_steps = 100",
+                    );
+                    if let Some(first) = frames {
+                        let message = format!("output[{first}] writes `fields.pvd` and its frames already");
+                        self.error(&path, message, "name all fields in one of them");
+                    }
+                    frames = frames.or(Some(k));
+                }
                 Output::Picture(picture) => {
                     let path = format!("{path}.picture");
+                    let same = |(_, field, component): &&(usize, &FieldName, Option<usize>)| {
+                        field.name() == picture.field.name() && *component == picture.component
+                    };
+                    if let Some((first, ..)) = drawn.iter().find(same) {
+                        let message = format!(
+                            "output[{first}] draws this field too, and both would write the same files `pictures/{}...`",
+                            picture.field.name()
+                        );
+                        self.error(&path, message, "keep one of them, or draw another component");
+                    }
+                    drawn.push((k, &picture.field, picture.component));
                     let given = [picture.every.is_some(), picture.every_steps.is_some(), !picture.at.is_empty()];
                     if given.iter().filter(|g| **g).count() > 1 {
                         self.error(&path, "at most one of `every`, `every_steps`, `at` may be given", "");

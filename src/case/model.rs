@@ -96,6 +96,9 @@ pub struct Condition {
     pub mirror: Option<Mirror>,
     /// The body goes on beyond its end as it begins.
     pub periodic: Option<Periodic>,
+    /// Of `initial` and `prescribe`: an exception to a condition before it, which wants other values of the same points.
+    #[serde(default, rename = "override")]
+    pub overrides: bool,
     /// When a prescribed value is released or a load ends: a step ends there.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0))]
     pub until: Option<f64>,
@@ -130,6 +133,23 @@ pub enum Motion {
 }
 
 impl Motion {
+    /// Which component.
+    pub fn component(&self) -> usize {
+        match self {
+            Motion::Displacement { component, .. } | Motion::Velocity { component, .. } => *component,
+            Motion::Concentration { .. } => 0,
+        }
+    }
+
+    /// Its value.
+    pub fn value(&self) -> &Formula {
+        match self {
+            Motion::Displacement { value, .. } | Motion::Velocity { value, .. } | Motion::Concentration { value } => {
+                value
+            }
+        }
+    }
+
     /// The key that chooses it.
     pub fn name(&self) -> &'static str {
         match self {

@@ -189,10 +189,11 @@ impl<const D: usize> Cloud<D> {
         self.stored(0..self.n_points()).filter(holds).map(|slot| slot as u32).collect()
     }
 
-    /// Slots of points, ascending.
+    /// Slots of points, ascending, each once.
     pub fn slots_of(&self, points: &[u32]) -> Vec<u32> {
         let mut slots: Vec<u32> = points.iter().map(|&point| self.slots[point as usize]).collect();
         slots.sort_unstable();
+        slots.dedup();
         slots
     }
 }

@@ -12,7 +12,7 @@ pub struct PointSets {
 impl PointSets {
     /// Adds a set; `slots` ascending.
     pub fn insert(&mut self, name: impl Into<String>, slots: Vec<u32>) {
-        debug_assert!(slots.is_sorted(), "slots of a set are ascending");
+        debug_assert!(slots.is_sorted_by(|a, b| a < b), "slots of a set are ascending, each once");
         self.sets.insert(name.into(), slots.into());
     }
 

@@ -100,10 +100,14 @@ impl<const D: usize> Builder<'_, D> {
         shape: Option<&Shape<D>>,
     ) -> Result<(Vec<Box<dyn Constraint>>, Vec<Box<dyn Term>>)> {
         let (mut constraints, mut terms) = (Vec::new(), self.mirror_amount(&diffusing.body.cloud));
+        let owned = self.owned(&diffusing.body.cloud)?;
         for (k, condition) in self.case.value.conditions.iter().enumerate() {
             let Diffusing { body, concentration, .. } = &mut *diffusing;
             let Some(on) = &condition.on else { continue };
-            let slots = self.slots(on, &body.cloud, &format!("conditions[{k}].on"))?;
+            let slots = match owned.get(&k) {
+                Some(owned) => owned.clone(),
+                None => self.slots(on, &body.cloud, &format!("conditions[{k}].on"))?,
+            };
             if let Some(Motion::Concentration { value }) = &condition.initial {
                 let path = format!("conditions[{k}].initial.concentration.value");
                 let mut profile = self.profile(value, &body.cloud, &slots, &path)?;

@@ -258,6 +258,7 @@ impl<const D: usize> Builder<'_, D> {
                 return Err(self.refuse(&path, "the points' file has a set of this name too", "rename one of them"));
             }
             let inside = self.region(region, shape, &path)?;
+            self.is_decided(region, cloud, &path)?;
             let slots = cloud.select_with_ties(|x, tie| inside(x, tie));
             if slots.is_empty() {
                 let (low, high) = cloud.bounds();
@@ -275,6 +276,29 @@ impl<const D: usize> Builder<'_, D> {
         }
         cloud.sets.insert("all", all);
         self.surfaces(cloud, shape)
+    }
+
+    /// Refuses a formula that is not a number at a point, which then is neither in the set nor outside.
+    fn is_decided(&self, region: &Region, cloud: &Cloud<D>, path: &str) -> Result<()> {
+        match region {
+            Region::Where(formula) => {
+                let expression = self.expression(formula)?;
+                let at = |slot: u32| {
+                    let x = crate::field::embed(&cloud.position(slot as usize));
+                    expression.evaluate(&[x[0], x[1], x[2], 0.0])
+                };
+                let Some(point) = cloud.slots.iter().position(|slot| at(*slot).is_nan()) else { return Ok(()) };
+                let position = rounded(&cloud.position(cloud.slots[point] as usize));
+                let message =
+                    format!("the formula is NaN at point {point}, position {position} m: neither true nor false");
+                Err(self.refuse(path, message, "keep it finite everywhere, as in `sqrt(max(x, 0)) > 0.1`"))
+            }
+            Region::All(regions) | Region::Any(regions) => {
+                regions.iter().try_for_each(|region| self.is_decided(region, cloud, path))
+            }
+            Region::Not(region) => self.is_decided(region, cloud, path),
+            Region::Box { .. } | Region::Inside(_) | Region::Layer { .. } => Ok(()),
+        }
     }
 
     /// Whether a place is in a region, but for a tie, m.
