@@ -39,6 +39,7 @@ pub(super) enum Mistake {
     /// The unit measures something else.
     Dimension {
         found: Dimension,
+        help: Option<String>,
     },
     Expression(ExpressionError),
     /// It follows from a mistake already reported.
@@ -64,11 +65,7 @@ impl Constants {
         if parsed.is_err() && (variables.contains(&word) || self.known.iter().any(is_known)) {
             return None;
         }
-        if parsed.is_ok()
-            && let Some(name) = self.unit_and_constant(unit_text)
-        {
-            return Some(Err(either_of_two(number, unit_text, name, text.len())));
-        }
+        let both = if parsed.is_ok() { self.unit_and_constant(unit_text) } else { None };
         let is_right = |unit: &Unit| wanted.is_none_or(|wanted| wanted == unit.dimension);
         let mut others = names(unit_text).skip(1);
         if !parsed.as_ref().is_ok_and(is_right)
@@ -76,9 +73,14 @@ impl Constants {
         {
             return Some(Err(unit_in_formula(0, text.len())));
         }
+        if let Some(name) = both.filter(|_| parsed.as_ref().is_ok_and(is_right)) {
+            return Some(Err(either_of_two(number, unit_text, name, text.len())));
+        }
+        let help =
+            both.map(|name| format!("`{name}` is a constant of this case too: {}", the_product(number, unit_text)));
         let value = parsed.map_err(Mistake::Unit).and_then(|unit| {
             if wanted.is_some_and(|wanted| wanted != unit.dimension) {
-                return Err(Mistake::Dimension { found: unit.dimension });
+                return Err(Mistake::Dimension { found: unit.dimension, help });
             }
             unit.to_si(number)
                 .ok_or_else(|| Mistake::Unit(UnitError { message: "the number cannot be read".to_owned(), help: None }))
@@ -270,9 +272,12 @@ impl<'a> Evaluation<'a> {
 fn either_of_two(number: &str, unit: &str, name: &str, end: usize) -> Mistake {
     let message =
         format!("`{name}` is a constant of this case and a unit too: a number before it is read as one in that unit");
-    let product = unit.split_whitespace().collect::<Vec<_>>().join("*");
-    let help = format!("write `{number}*{product}` for the product; for the unit, give the constant another name");
+    let help = format!("{}; for the unit, give the constant another name", the_product(number, unit));
     Mistake::Expression(ExpressionError { message, start: 0, end, help: Some(help) })
+}
+
+fn the_product(number: &str, unit: &str) -> String {
+    format!("write `{number}*{}` for the product", unit.split_whitespace().collect::<Vec<_>>().join("*"))
 }
 
 fn unit_in_formula(start: usize, end: usize) -> Mistake {
@@ -298,11 +303,11 @@ impl Mistake {
             Self::Unit(error) => {
                 Diagnostic { help: error.help, allowed, ..Diagnostic::error(place, path, error.message) }
             }
-            Self::Dimension { found } => {
+            Self::Dimension { found, help } => {
                 let wanted =
                     wanted.map_or_else(String::new, |(wanted, _)| format!(" where {} is wanted", wanted.name()));
                 let message = format!("this is {}{wanted}", found.name());
-                Diagnostic { allowed, ..Diagnostic::error(place, path, message) }
+                Diagnostic { allowed, help, ..Diagnostic::error(place, path, message) }
             }
             Self::Expression(error) => {
                 let NodeValue::Text(text) = &node.value else {
