@@ -22,7 +22,8 @@ pub fn check(args: &CaseArgs) -> Result<ExitCode> {
             Some(shape) => say!(
                 "volume            {:.6e} {unit} of cells, {shape:.6e} {unit} of the shape: {:+.2} %",
                 facts.volume,
-                100.0 * (facts.volume / shape - 1.0)
+                // Adding 0 makes one zero of the two.
+                (1e4 * (facts.volume / shape - 1.0)).round() / 100.0 + 0.0
             ),
             None => say!("volume            {:.6e} {unit}", facts.volume),
         }

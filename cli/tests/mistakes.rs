@@ -521,6 +521,34 @@ fn mistakes() -> Vec<Mistake> {
         Mistake::table("csv_not_a_number", "x,y,volume\n0,0,1e-6\nnan,0,1e-6\n"),
         Mistake::table("csv_volume_zero", "x,y,volume\n0,0,1e-6\n1e-3,0,0\n"),
         Mistake::table("csv_two_points_in_one_place", "x,y,volume\n0,0,1e-6\n1e-3,0,1e-6\n0,0,1e-6\n"),
+        Mistake::table("csv_volumes_in_another_unit", "x,y,volume\n0,0,1\n1e-3,0,1\n2e-3,0,1\n"),
+        Mistake::table(
+            "csv_one_volume_too_large",
+            "x,y,volume\n0,0,1e-6\n1e-3,0,1e-6\n# far too large\n2e-3,0,1e300\n",
+        ),
+        Mistake::table("csv_point_too_far", "x,y,volume\n0,0,1e-6\n1e-3,0,1e-6\n2e-3,1e300,1e-6\n"),
+        Mistake::table(
+            "csv_nearly_in_one_place",
+            "x,y,volume\n0,0,1e-6\n1e-3,0,1e-6\n1.0000001e-3,0,1e-6\n2e-3,0,1e-6\n3e-3,0,1e-6\n",
+        ),
+        Mistake::table("csv_nobody_sees_anybody", "x,y,volume\n0,0,1e-6\n5e-3,0,1e-6\n10e-3,0,1e-6\n"),
+        Mistake::table("csv_one_point", "x,y,volume\n0,0,1e-6\n"),
+        Mistake::whole(
+            "one_cell",
+            CLOUD.replace(POINTS, "shape = { rectangle = { size = [\"1 mm\", \"1 mm\"] } }\nspacing = \"1 mm\""),
+        ),
+        Mistake {
+            beside: Some(("points.csv", "x,y,volume\n0,0,1e-6\n1e-3,0,1e-6\n2e-3,0,1e-6\n9e-3,0,1e-6\n".into())),
+            ..Mistake::whole(
+                "csv_loaded_alone",
+                CLOUD
+                    .replace(
+                        "initial = { velocity = { component = 0, value = \"x\" } }",
+                        "load = { body_force = { component = 0, value = 1.0 } }",
+                    )
+                    .replace("[solver.velocity_verlet]", "[solver.dynamic_relaxation]"),
+            )
+        },
         Mistake::table("csv_not_utf8", b"x,y,volume\n0,0,1e-6\n1e-3,\xFF,1e-6\n"),
         Mistake::table("csv_set_undefined", "x,y,volume,sets\n0,0,1e-6,high\n0,1e-3,1e-6,low\n")
             .with(&["--set", "conditions.0.on=hihg"]),

@@ -1,6 +1,7 @@
 //! The tests of the library from outside: one program, so that what they are generic over is compiled once.
 
 mod architecture;
+mod clouds;
 mod common;
 mod cracks_at_rest;
 mod diffusion;

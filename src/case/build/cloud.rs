@@ -35,17 +35,28 @@ impl<const D: usize> Builder<'_, D> {
         let mut numbers = vec![0; positions.len()];
         cloud.slots.iter().enumerate().for_each(|(point, &slot)| numbers[slot as usize] = point);
         let name = |slot: usize| self.named(numbers[slot], &positions[slot]);
+        // The first in point order, not in the order of slots.
+        let first = |odd: &dyn Fn(usize) -> bool| {
+            let mut odd = cloud.slots.iter().map(|&slot| slot as usize).filter(|&slot| odd(slot));
+            odd.next().map(|slot| (slot, 1 + odd.count()))
+        };
+        let smallest = volumes.iter().copied().fold(f64::INFINITY, f64::min).powf(1.0 / D as f64);
+        let is_far = |slot: usize| positions[slot].iter().any(|x| x.abs() > FAR * smallest);
+        if let Some((slot, n)) = first(&is_far) {
+            let message = format!(
+                "{n} points are too far from the origin for cells of {} m, the first {}: rounding takes the digits of their \
+                 distances",
+                short(smallest),
+                name(slot)
+            );
+            return Err(self.refuse(FILE, message, "is the unit right?"));
+        }
         let size = |slot: usize| volumes[slot].powf(1.0 / D as f64);
         let found = nearest(positions);
         let ratios: Vec<f64> = found.iter().enumerate().map(|(slot, (distance, _))| size(slot) / distance).collect();
         let mut sorted = ratios.clone();
         sorted.sort_by(f64::total_cmp);
         let usual = sorted[sorted.len() / 2];
-        // The first in point order, not in the order of slots.
-        let first = |odd: &dyn Fn(usize) -> bool| {
-            let mut odd = cloud.slots.iter().map(|&slot| slot as usize).filter(|&slot| odd(slot));
-            odd.next().map(|slot| (slot, 1 + odd.count()))
-        };
         let here = cloud.slots[0] as usize;
         let fits = |slot: usize| {
             let (distance, there) = found[slot];
@@ -89,17 +100,6 @@ impl<const D: usize> Builder<'_, D> {
             let message = format!("the volume of {n} of the points does not fit the distances: {}", fits(slot));
             return Err(self.refuse(FILE, message, &help));
         }
-        let smallest = volumes.iter().copied().fold(f64::INFINITY, f64::min).powf(1.0 / D as f64);
-        let is_far = |slot: usize| positions[slot].iter().any(|x| x.abs() > FAR * smallest);
-        if let Some((slot, n)) = first(&is_far) {
-            let message = format!(
-                "{n} points are too far from the origin for cells of {} m, the first {}: rounding takes the digits of their \
-                 distances",
-                short(smallest),
-                name(slot)
-            );
-            return Err(self.refuse(FILE, message, "is the unit right?"));
-        }
         if !(1.0 / ODD..=ODD).contains(&usual) {
             let message = format!("the volumes hardly fit the distances: {}; so it is of half the points", fits(here));
             log::warn!("{}", self.source().warning(FILE, message).help(help));
@@ -139,8 +139,13 @@ impl<const D: usize> Builder<'_, D> {
             None => ("geometry.spacing", "a smaller spacing gives the body more cells"),
         };
         if alone.len() == cloud.n_points() {
-            let what = if alone.len() == 1 { "there is one point" } else { "no point has a neighbour" };
-            let message = format!("{what} within the horizon of {} m: {name} sees nobody", short(body.horizon));
+            let message = match alone.len() {
+                1 => format!("there is one point, {name}, and it sees nobody"),
+                _ => format!(
+                    "no point has a neighbour within the horizon of {} m: {name} sees nobody, and so do all others",
+                    short(body.horizon)
+                ),
+            };
             return Err(self.refuse(path, message, help));
         }
         let message = format!(
@@ -188,7 +193,9 @@ impl<const D: usize> Builder<'_, D> {
             None => None,
         };
         let line = line.map_or(String::new(), |line| format!(" (line {line})"));
-        format!("point {point}{line} at {} m", rounded(x))
+        let is_short = x.iter().all(|x| x.abs() < 1e9);
+        let place = if is_short { rounded(x) } else { format!("({})", x.map(|x| format!("{x:e}")).join(", ")) };
+        format!("point {point}{line} at {place} m")
     }
 }
 
