@@ -14,6 +14,7 @@ mod images;
 mod limits;
 mod materials;
 mod memory;
+mod overlaps;
 mod parity;
 mod patch;
 mod refinement;
