@@ -167,7 +167,7 @@ pub fn moved_edge<const D: usize>(
 ) -> Option<f64> {
     let window = 2.0 * BLUR * spacing;
     let (row, rows) = SAMPLE;
-    let mut sample = vec![0..n];
+    let mut sample: Vec<Range<usize>> = std::iter::once(0..n).collect();
     if n > row * rows {
         sample = (0..rows).map(|k| k * (n - row) / (rows - 1)).map(|first| first..first + row).collect();
         let bins = Distances::of(positions, sample.clone(), reach, window, beyond).cluster(spacing)?.bins;
