@@ -154,20 +154,20 @@ fn printed_unit<'a>(coordinates: impl Iterator<Item = &'a f64>, spacing: f64) ->
 
 /// By how much the edge of all families has to move, m, so that pairs on it are bonds all or none; None where it may stay.
 ///
-/// `edge`: up to which e pairs are bonds where it stays. `closed`: whether pairs exactly on the edge are. `reach`: the largest
+/// `n`: of the positions, those of points; the others, of images, see nobody. `edge`: up to which e pairs are bonds where it stays. `closed`: whether pairs exactly on the edge are. `reach`: the largest
 /// length of a pair on the edge, m.
 pub fn moved_edge<const D: usize>(
     positions: &[Vector<D>],
+    n: usize,
     spacing: f64,
     reach: f64,
     beyond: &Beyond<'_, D>,
     edge: f64,
     closed: bool,
 ) -> Option<f64> {
-    let n = positions.len();
     let window = 2.0 * BLUR * spacing;
     let (row, rows) = SAMPLE;
-    let mut sample = vec![0..n];
+    let mut sample: Vec<Range<usize>> = std::iter::once(0..n).collect();
     if n > row * rows {
         sample = (0..rows).map(|k| k * (n - row) / (rows - 1)).map(|first| first..first + row).collect();
         let bins = Distances::of(positions, sample.clone(), reach, window, beyond).cluster(spacing)?.bins;
@@ -262,7 +262,7 @@ mod tests {
             for rule in PartialVolume::ALL {
                 let beyond = |_: usize, _: usize, xi: &Vector<2>| rule.beyond(xi, 1.0, 3.0);
                 let edge = rule.edge::<2>(1.0, 3.0);
-                assert_eq!(moved_edge(&positions, 1.0, rule.reach::<2>(1.0, 3.0), &beyond, edge, true), None);
+                assert_eq!(moved_edge(&positions, n, 1.0, rule.reach::<2>(1.0, 3.0), &beyond, edge, true), None);
             }
         }
     }

@@ -89,7 +89,7 @@ pub fn body<const D: usize>(cloud: crate::geometry::Cloud<D>, horizon: f64, rule
     if cloud.is_uniform() {
         let reach = rule.reach::<D>(spacing, horizon);
         let beyond = |_: usize, _: usize, xi: &Vector<D>| rule.beyond(xi, spacing, horizon);
-        return match moved_edge(positions, spacing, reach, &beyond, edge, closed) {
+        return match moved_edge(positions, cloud.n_points(), spacing, reach, &beyond, edge, closed) {
             None => Body::new(cloud, horizon, rule.rim::<D>(spacing, horizon), |xi| rule.touches(xi, spacing, horizon)),
             Some(edge) => {
                 let rim = 0.0..reach + edge.max(0.0);
@@ -103,7 +103,7 @@ pub fn body<const D: usize>(cloud: crate::geometry::Cloud<D>, horizon: f64, rule
     let reach = rule.reach::<D>(largest, horizon);
     let beyond =
         |i: usize, j: usize, xi: &Vector<D>| rule.beyond(xi, sizes[i], horizon).min(rule.beyond(xi, sizes[j], horizon));
-    let edge = moved_edge(positions, spacing, reach, &beyond, edge, closed).unwrap_or(edge);
+    let edge = moved_edge(positions, cloud.n_points(), spacing, reach, &beyond, edge, closed).unwrap_or(edge);
     let rim = 0.0..reach + edge.max(0.0);
     let mut body = Body::seeing(cloud, horizon, rim, &|i, j, xi| beyond(i, j, xi) <= edge);
     let horizons = vec![horizon; sizes.len()];

@@ -390,9 +390,8 @@ fn opposed<const D: usize>(blades: &[Blade<'_, D>], i: usize, j: usize, join: f6
             return Some(dot(&n, &m) < 0.0);
         }
     }
-    let shared = here.edges().into_iter().find_map(|edge| {
-        there.edges().into_iter().find_map(|other| shared(edge, other, join).map(|(at, same)| (at, same)))
-    });
+    let shared =
+        here.edges().into_iter().find_map(|edge| there.edges().into_iter().find_map(|other| shared(edge, other, join)));
     match (D, shared) {
         // Two of a line that overlap, and facets that share an edge, which each goes round in its own direction.
         (2, Some((_, is_same_way))) => Some(!is_same_way),

@@ -54,11 +54,7 @@ impl<const D: usize> Builder<'_, D> {
             return Ok(cloud);
         }
         let largest = cloud.slots.iter().map(|&slot| cloud.size(slot as usize)).fold(0.0, f64::max);
-        let mut reach = rule.rim::<D>(largest, horizon).end;
-        if self.case.value.geometry.points.is_some() {
-            // Printed coordinates may leave a pair on the rim a little beyond it.
-            reach += 2.0 * rim::BLUR * cloud.spacing;
-        }
+        let reach = rule.rim::<D>(largest, horizon).end;
         let mut ends = [Ends::Free; D];
         for (d, ends) in ends.iter_mut().enumerate() {
             if let Some((k, periodic)) = self.periodic(d) {
@@ -76,7 +72,9 @@ impl<const D: usize> Builder<'_, D> {
                 *ends = Ends::Mirrors(mirrors);
             }
         }
-        Ok(cloud.with_images(&ends, reach))
+        // Printed coordinates may leave a pair on the rim a little beyond it.
+        let blur = if self.case.value.geometry.points.is_some() { 2.0 * rim::BLUR * cloud.spacing } else { 0.0 };
+        Ok(cloud.with_images(&ends, reach + blur))
     }
 
     /// Lower face of the cells of a shape along an axis (m), and their number: whole cells from face to face.
@@ -203,7 +201,10 @@ impl<const D: usize> Builder<'_, D> {
             return Err(self.refuse(path, message, help));
         }
         // From the plane to the far face of the last cells.
-        let width = inside(if mirror.side == Side::Low { high[d] } else { low[d] }) + 0.5 * cloud.spacing;
+        let last = inside(if mirror.side == Side::Low { high[d] } else { low[d] });
+        let is_last = |slot: &&u32| inside(cloud.position(**slot as usize)[d]) >= last;
+        let cell = cloud.slots.iter().find(is_last).map_or(cloud.spacing, |&slot| cloud.size(slot as usize));
+        let width = last + 0.5 * cell;
         // Images of images along one axis are not made.
         let both = self.mirrors(d).count() == 2;
         if (shape.is_some() || both) && layers(cloud.spacing, width) < layers(cloud.spacing, reach) {

@@ -115,11 +115,13 @@ fn by_cell<const D: usize, T: Copy>(body: &Body<D>, complete: &dyn Fn(f64, f64) 
         let complete = complete(body.cloud.spacing, body.horizon);
         return (0..body.cloud.n_slots()).for_each(|slot| each(slot, complete));
     };
-    // By the ratio δ/Δx, of clouds of many sizes to a quarter of a percent.
+    // By the ratio δ/Δx; in clouds, which may have a size for each point, to a quarter of a percent.
+    let is_cloud = grading.horizons.windows(2).all(|pair| pair[0] == pair[1]);
     let mut known = BTreeMap::new();
     for (slot, (&size, &horizon)) in grading.sizes.iter().zip(&grading.horizons).enumerate() {
-        let ratio: f64 = 256.0 * (horizon / size).log2();
-        each(slot, *known.entry(ratio.round() as i64).or_insert_with(|| complete(size, horizon)));
+        let ratio: f64 = horizon / size;
+        let key = if is_cloud { (256.0 * ratio.log2()).round().to_bits() } else { ratio.to_bits() };
+        each(slot, *known.entry(key).or_insert_with(|| complete(size, horizon)));
     }
 }
 
