@@ -22,6 +22,7 @@ mod hybrid_wave;
 mod inclusion;
 mod joint;
 mod kirsch;
+mod l_panel;
 mod navier;
 mod precision;
 mod refined_branching;
@@ -93,6 +94,7 @@ pub const STUDIES: &[Study] = &[
     },
     precision::PRECISION,
     double_cantilever::STUDY,
+    l_panel::STUDY,
     kirsch::STUDY,
     joint::STUDY,
     inclusion::STUDY,
