@@ -49,8 +49,8 @@ const MEASURED: [[f64; 2]; 17] = [
 ];
 
 fn run(_full: bool) -> Result<Outcome> {
-    let (loads, defect, bonds, _) = loads("load")?;
-    let (_, turned, others, mut path) = loads("equilibrium")?;
+    let (loads, defect, bonds, _) = grown("load")?;
+    let (_, turned, others, mut path) = grown("equilibrium")?;
     path.insert(0, (0.0, 0.0));
     let mut outcome = Outcome::default();
     let peak = BEFORE[1];
@@ -127,7 +127,7 @@ fn run(_full: bool) -> Result<Outcome> {
 /// Loads at the end of the load steps (kN/m), energy defect over external work, broken bonds, and the load curve of all breaks
 /// (mm, N).
 #[allow(clippy::type_complexity)]
-fn loads(control: &str) -> Result<(Vec<f64>, f64, f64, Vec<(f64, f64)>)> {
+fn grown(control: &str) -> Result<(Vec<f64>, f64, f64, Vec<(f64, f64)>)> {
     let mut simulation = bundled_simulation("l_panel", &[("solver.quasi_static.control", control)])?;
     let model = &mut *simulation.model;
     model.start();
