@@ -23,7 +23,7 @@ macro_rules! bundled {
 }
 
 /// All of them, in the order in which a newcomer may look at them.
-pub const CASES: [Bundled; 19] = [
+pub const CASES: [Bundled; 20] = [
     bundled!("crack_branching", "2D: a crack runs through glass and branches; the main example"),
     bundled!("crack_branching_refined", "2D: the same crack on cells that are fine about its tips only"),
     bundled!("crack_branching_hybrid", "2D: a larger plate, collocation where it is whole and bonds where it breaks"),
@@ -36,6 +36,7 @@ pub const CASES: [Bundled; 19] = [
     bundled!("plate_with_hole", "2D: a plate with a hole is pulled slowly until it rests"),
     bundled!("stretched_plate", "2D: a plate with the Poisson ratio of aluminium is pulled; state-based"),
     bundled!("double_cantilever", "2D: a crack grows as a specimen is wedged open, in equilibrium all the way"),
+    bundled!("l_panel", "2D: a crack from the corner of a panel of concrete, at rest, bond by bond"),
     bundled!(
         "inclusion",
         "2D: a stiff disc in a soft plate is strained evenly, and less than the plate; two materials"

@@ -22,6 +22,7 @@ mod hybrid_wave;
 mod inclusion;
 mod joint;
 mod kirsch;
+mod l_panel;
 mod navier;
 mod precision;
 mod pressed;
@@ -94,6 +95,7 @@ pub const STUDIES: &[Study] = &[
     },
     precision::PRECISION,
     double_cantilever::STUDY,
+    l_panel::STUDY,
     kirsch::STUDY,
     pressed::STUDY,
     joint::STUDY,

@@ -8,13 +8,13 @@ use bondwise::case::read_text;
 use bondwise::simulation::Simulation;
 use bondwise::solver::linear::{Direct, Sparse};
 
-/// An L-shaped panel that is pushed up at its arm (Winkler 2001), of cells of 25 mm.
+/// An L-shaped panel that is pushed up at its arm (Winkler 2001), of cells of 31 mm.
 const PANEL: &str = r#"
 [case]
 title = "Panel"
 dimension = 2
 [constants]
-h = "25 mm"
+h = "31.25 mm"
 [geometry]
 spacing = "h"
 shape = { polygon = { vertices = [[0,0],["250 mm",0],["250 mm","250 mm"],["500 mm","250 mm"],["500 mm","500 mm"],[0,"500 mm"]] } }
@@ -98,7 +98,7 @@ struct Reference {
 
 impl Reference {
     fn of_panel(simulation: &Simulation, u_max: f64, load: [[f64; 2]; 2]) -> Self {
-        let (h, young, energy) = (25e-3, 25.85e9, 90.0);
+        let (h, young, energy) = (31.25e-3, 25.85e9, 90.0);
         let x = simulation.model.positions().to_vec();
         let delta = 3.0 * h;
         let near = |x: &[f64; 3]| x[0] > 0.45 && x[0] < 0.48 && x[1] > 0.25 && x[1] < 0.275;

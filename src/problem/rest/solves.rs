@@ -64,37 +64,43 @@ fn grow(
             order.first(ahead.iter().enumerate().map(|(k, bond)| (k, [bond.stretch, bond.rate], bond.critical)))
         };
         let (before, time) = (walk.now, next.map_or(limit, |next| next.time.min(limit)));
+        let ratio = worst(rest, walk);
+        let mut reached = ratio;
         if time != before {
             walk.go(rest, time);
             let moved = if linear { Ok(()) } else { walk.look(rest, inverse, goals, observe) };
-            let too_far = match moved {
-                Ok(()) => !linear && time > before && worst(rest, walk) > 1.0 + MISSED,
+            let share = match moved {
+                Ok(()) => {
+                    reached = worst(rest, walk);
+                    let too_far = !linear && time > before && reached > 1.0 + MISSED;
+                    // Where a straight line between both ends has the break; half of the way where that has led nowhere.
+                    too_far.then(|| if tries < 3 { (1.0 - ratio) / (reached - ratio) } else { 0.5 })
+                }
                 Err(NotConverged::Interrupted) => return Err(NotConverged::Interrupted),
-                Err(unrest) if time > before && tries < TRIES && !unrest.stays() => true,
-                Err(unrest) => return Err(unrest),
+                Err(unrest) if time <= before || tries >= TRIES || unrest.stays() => return Err(unrest),
+                Err(_) => Some(0.5),
             };
-            if too_far && tries < TRIES {
+            if let Some(share) = share.filter(|_| tries < TRIES) {
                 walk.restore(rest, books);
-                limit = 0.5 * (before + time);
+                limit = before + share.clamp(0.0, 1.0) * (time - before);
                 tries += 1;
                 continue;
             }
             books.go_on(rest);
             walk.keep(rest, books);
         }
-        let worst = worst(rest, walk);
-        let arrived = linear || worst > 1.0 - MISSED || tries == TRIES;
-        if worst <= 1.0
-            && (time >= walk.end && next.is_none_or(|next| next.time > walk.end) || !arrived || time == limit)
-        {
-            if time >= walk.end {
+        let due = if linear { next.is_some_and(|next| next.time <= time) } else { reached > 1.0 - MISSED };
+        // Loads that follow have not fallen as far as the tangent has said.
+        let above = !linear && time < before && reached > 1.0 + MISSED && tries < TRIES;
+        if !due || above {
+            if !due && time >= walk.end {
                 return Ok(());
             }
-            // Not yet: the tangent has led short of the break, or the way was cut.
-            tries += 1;
+            tries += usize::from(above);
             limit = walk.end;
             continue;
         }
+        let worst = reached;
         (limit, tries) = (walk.end, 0);
         let with = |s: f64, _: f64, critical: f64| breaks_with(breaking.together, tie, worst, s / critical);
         let group = rest.body.stretched(&rest.displacement, &walk.velocity, &with);

@@ -65,6 +65,8 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 const QUOTIENT: f64 = 1e-10;
 /// Corrections in one place, each of which must make what is left smaller by a half.
 const CORRECTIONS: usize = 60;
+/// What a linear solver leaves of what is out of balance where forces are not linear.
+const FORCING: f64 = 1e-4;
 /// A rigid motion is looked for in what is out of balance only where that is a share of the loads.
 const SEEN: f64 = 1e-6;
 
@@ -252,7 +254,10 @@ impl Walk {
                 };
             }
             last = size;
-            inverse.apply(rest, &mut r, (0.2 * goal * scale.max(floor / goal) / size).clamp(1e-15, 0.1), told)?;
+            let share = (0.2 * (goal * scale).max(floor) / size).clamp(1e-15, 0.1);
+            // A tangent that is a difference quotient knows no more digits, and the next correction makes up for it.
+            let share = if rest.body.is_linear() { share } else { share.max(FORCING) };
+            inverse.apply(rest, &mut r, share, told)?;
             vector::add(1.0, &r, if rates { &mut self.velocity } else { &mut rest.displacement });
             self.corrections += 1;
         }
