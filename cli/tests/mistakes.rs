@@ -200,6 +200,13 @@ fn mistakes() -> Vec<Mistake> {
                 (SOLVER, "[solver.quasi_static]\n"),
             ],
         ),
+        patch("unknown_control", SOLVER, "[solver.quasi_static]\ncontrol = \"loads\"\n"),
+        patch("share_beyond_one", SOLVER, "[solver.quasi_static]\nbreak = { share = 1.5 }\n"),
+        patch(
+            "share_of_no_excess",
+            SOLVER,
+            "[solver.quasi_static]\ncontrol = \"equilibrium\"\nbreak = { share = 0.5 }\n",
+        ),
         patch(
             "refinement_at_rest",
             SOLVER,
