@@ -519,7 +519,7 @@ fn mistakes() -> Vec<Mistake> {
         Mistake::table("csv_without_header", "0.0,0.0,1e-6\n1e-3,0.0,1e-6\n"),
         Mistake::table("csv_column_missing", "x,y\n0,0\n"),
         Mistake::table("csv_column_twice", "x,y,x,volume\n0,0,0,1\n"),
-        Mistake::table("csv_column_unknown", "x,y,z,volume\n0,0,0,1\n"),
+        Mistake::table("csv_column_unknown", "x,y,mass,volume\n0,0,0,1\n"),
         Mistake::table("csv_semicolons", "x;y;volume\n0;0;1\n"),
         Mistake::table("csv_ragged", "x,y,volume\n0,0,1e-6\n1e-3,0\n"),
         Mistake::table("csv_text_for_number", "x,y,volume\n0,0,1e-6\n1e-3,here,1e-6\n"),

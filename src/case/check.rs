@@ -551,7 +551,8 @@ impl Checker<'_> {
     fn outputs<'a>(&mut self, case: &'a Case, imported: bool, used: &mut BTreeSet<&'a str>) {
         let mut tables: Vec<(&str, String, usize)> = Vec::new();
         let (mut histories, mut tips) = (0, 0);
-        let (mut frames, mut drawn): (Option<usize>, Vec<(usize, &FieldName, Option<usize>)>) = (None, Vec::new());
+        let mut frames: Option<usize> = None;
+        let mut drawn: Vec<(usize, &FieldName, Option<usize>)> = Vec::new();
         for (k, output) in case.output.iter().enumerate() {
             let path = format!("output[{k}]");
             match output {

@@ -241,6 +241,7 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// Adds what acts on pieces: `coefficient` of each and of each component, N for a unit of the formula.
+    #[allow(clippy::too_many_arguments)] // what, where, onto what
     pub(super) fn on_pieces(
         &self,
         k: usize,

@@ -108,7 +108,7 @@ impl<const D: usize, P: Packs> Elasticity<D, P> {
         let Some(failure) = &self.failure else { return Vec::new() };
         let imaged = [u, v].map(|flat| self.imaged(flat));
         let [u, v] = [imaged[0].as_deref().unwrap_or(u), imaged[1].as_deref().unwrap_or(v)];
-        let [u, v] = [u, v].map(|flat| components::<D, _>(flat));
+        let [u, v] = [u, v].map(components::<D, _>);
         let (body, states, is_linear) = (&self.body, &self.state.states, self.material.is_linear());
         let of_slot = |here: usize| -> Vec<Stretched> {
             let holding = body.bonds_of(here).filter(|(bit, _)| states.holds(*bit));
