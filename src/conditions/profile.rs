@@ -46,6 +46,8 @@ pub const FOURTH_ORDER: Slope = Slope {
 
 /// In h: how far beyond its first and last instant a formula is taken to be asked because of roundings of the time.
 const ROUNDING: f64 = 1e-6;
+/// Of the last instant: as far behind it, a time is that instant but for the rounding of sums of steps.
+const BEYOND: f64 = 1e-9;
 
 impl FormulaAtPoints {
     pub fn new<const D: usize>(expression: Expression, cloud: &Cloud<D>, slots: &Arc<[u32]>) -> Self {
@@ -103,7 +105,8 @@ impl FormulaAtPoints {
     pub fn at(&mut self, t: f64) -> &[f64] {
         if self.moves || !self.ready {
             let [x, y, z] = &self.columns;
-            let t = t.min(self.last);
+            // But for rounding: whoever marches on beyond the end of a run gets what the formula says there.
+            let t = if t <= self.last * (1.0 + BEYOND) { t.min(self.last) } else { t };
             self.expression.evaluate_batch(&[x, y, z, &[t]], &mut self.values);
             self.ready = true;
         }
